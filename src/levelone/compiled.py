@@ -1,0 +1,65 @@
+"""How every kernel is compiled, and where its machine code is kept.
+
+Reassociation and reciprocals are allowed; the assumption that nothing is NaN or infinite is not, since it removes the very test
+that finds a diverged run. ``nogil`` lets threads work on chunks of a batch side by side.
+
+Numba looks only at a function's own file to decide whether kept machine code is still good: a change in a file that it calls goes
+unseen, and the old numbers come back. Kept code therefore lies in a folder named by the contents of every file that holds kernels.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+
+FASTMATH = {"contract", "arcp", "nsz", "reassoc"}
+FOLDERS = ("dynamics", "handling", "vehicle")
+
+
+@cache
+def cache_folder() -> str | None:
+    """A writable folder for machine code, or None where there is no such place."""
+    root = Path(__file__).parent
+    digest = hashlib.blake2b(numba.__version__.encode(), digest_size=8)
+    for folder in FOLDERS:
+        for source in sorted((root / folder).rglob("*.py")):
+            digest.update(source.read_bytes())
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    for place in (Path(base), Path(tempfile.gettempdir()) / f"cache-{os.getuid()}"):
+        folder = place / "levelone" / digest.hexdigest()
+        try:
+            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+            with tempfile.TemporaryFile(dir=folder):
+                return str(folder)
+        except OSError:
+            continue
+    return None
+
+
+def _decorate(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
+    def decorate(function: Callable[..., Any]) -> Any:
+        folder = cache_folder()
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = folder or before
+        try:
+            return numba.njit(cache=folder is not None, nogil=True, fastmath=FASTMATH, error_model="numpy", **options)(function)
+        finally:
+            numba.config.CACHE_DIR = before
+
+    return decorate
+
+
+#: an entry point or a function large enough to stand by itself in machine code
+kernel = _decorate({})
+#: the same for the innermost functions: they allocate nothing and count no references to arrays (the count is a locked
+#: instruction, and cost a quarter of the simulation)
+innermost = _decorate({"_nrt": False})
+#: a small function that always becomes part of its caller; allocates nothing
+inlined = _decorate({"forceinline": True, "_nrt": False})
