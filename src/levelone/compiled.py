@@ -25,22 +25,20 @@ FOLDERS = ("dynamics", "handling", "vehicle")
 
 @cache
 def cache_folder() -> str | None:
-    """A writable folder for machine code, or None where there is no such place."""
+    """The user's own folder for machine code, or None where it cannot be written; never a folder that others can write to."""
     root = Path(__file__).parent
     digest = hashlib.blake2b(numba.__version__.encode(), digest_size=8)
     for folder in FOLDERS:
         for source in sorted((root / folder).rglob("*.py")):
             digest.update(source.read_bytes())
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    for place in (Path(base), Path(tempfile.gettempdir()) / f"cache-{os.getuid()}"):
-        folder = place / "levelone" / digest.hexdigest()
-        try:
-            folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-            with tempfile.TemporaryFile(dir=folder):
-                return str(folder)
-        except OSError:
-            continue
-    return None
+    folder = Path(base) / "levelone" / digest.hexdigest()
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with tempfile.TemporaryFile(dir=folder):
+            return str(folder)
+    except OSError:
+        return None
 
 
 def _decorate(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
