@@ -30,16 +30,6 @@ CHANNEL_UNITS = dict(
     zip(CHANNELS, ("m", "m", "m", "m/s", "m/s", "m/s", "rad", "rad", "rad", "rad/s", "rad/s", "rad/s",
                    "m/s", "m/s", "m/s", "m/s", "rad", "rad"), strict=True)
 )  # fmt: skip
-REFERENCE_UNITS = {
-    "V_lon": "m/s",
-    "V_lat": "m/s",
-    "V_vert": "m/s",
-    "yaw_rate": "rad/s",
-    "theta": "rad",
-    "phi": "rad",
-    "q": "rad/s",
-    "p": "rad/s",
-}
 CHUNK = 32
 
 
@@ -133,7 +123,8 @@ def channel_names(vehicle: Vehicle) -> tuple[str, ...]:
 
 def threads_of(threads: int | None) -> int:
     """Number of worker threads: as asked, or one for each processor that this process may use."""
-    return threads or len(os.sched_getaffinity(0))
+    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return threads or available or 1
 
 
 def simulate(
@@ -228,7 +219,7 @@ def _history(
     time = manoeuvre.ticks()
     base = {"V_lon": manoeuvre.trim_speed, "V_vert": manoeuvre.trim_climb}.get(manoeuvre.axis, 0.0)
     reference = f"{manoeuvre.axis}_ref"
-    units = {name: CHANNEL_UNITS.get(name, "1") for name in wanted} | {reference: REFERENCE_UNITS[manoeuvre.axis]}
+    units = {name: CHANNEL_UNITS.get(name, "1") for name in wanted} | {reference: manoeuvre.unit}
     flown = {name: records[:, row] for row, name in enumerate(wanted)}
     trim = {name: records[:, row, 0] for row, name in enumerate(wanted)} | {reference: np.full(n, base)}
     flown[reference] = np.broadcast_to(base + manoeuvre.command(time), (n, len(time)))
