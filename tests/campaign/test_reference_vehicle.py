@@ -31,7 +31,7 @@ def test_at_least_95_percent_of_the_factor_box_is_stable(study: Study) -> None:
 
 
 @pytest.mark.parametrize("speed", [0.0, 5.0, 10.0, 15.0])
-@pytest.mark.parametrize("climb", [0.0, 1.0, 2.0])
+@pytest.mark.parametrize("climb", [0.0, 1.0, 2.0, 3.0])
 def test_trim_residuals(study: Study, speed: float, climb: float) -> None:
     found = trim(study.vehicle, speed, climb)
     assert found.status[0] == Status.OK

@@ -59,10 +59,10 @@ class SweepCheck:
         }  # fmt: skip
 
 
-def sweep_check(model: BuiltinModel, sweep: Manoeuvre, windows: tuple[float, ...], dt: float | None = None) -> SweepCheck:
+def sweep_check(model: BuiltinModel, sweep: Manoeuvre, windows: tuple[float, ...]) -> SweepCheck:
     """Fly the sweep, extended to 2.5 omega_180 where the linear response says that phase delay needs it, and identify it."""
     nominal = batch_of(model.vehicle)
-    step = model.step if dt is None else replace(model.step, dt=dt)
+    step = model.step
     linear_model = linearize(nominal, step.trim_speed, flight_mode=step.flight_mode, dt=step.dt, threads=model.threads)
     linear = {name: linear_model.frequency_response("V_lon", name, model.omega).select(0) for name in ("q", "theta")}
     linear["theta"] = -linear["theta"]
@@ -70,8 +70,6 @@ def sweep_check(model: BuiltinModel, sweep: Manoeuvre, windows: tuple[float, ...
     needed = 2.5 * float(reading["q"].omega_180)
     if np.isfinite(needed) and needed > sweep.omega_max:
         sweep = replace(sweep, omega_max=needed)
-    if dt is not None:
-        sweep = replace(sweep, dt=dt)
     history = simulate(nominal, sweep, channels=("q", "theta", "V_lon"), threads=model.threads)
     swept = {
         name: identify(history, name, sign=sign, windows=windows, omega_min=sweep.omega_min, omega_max=sweep.omega_max).select(0)

@@ -92,11 +92,29 @@ def trim_chunk(plants, law, speeds, climb, wind, unknowns, residuals, states, me
         theta, phi = read_trim(law, segment, d, 0), read_trim(law, segment, d, 1)
         for r in range(n):
             base[r] = read_trim(law, segment, d, 2 + r)
-        z[:] = 0.0
-        z[0], z[1] = theta, phi
-        good = newton(
-            plant, work, law.allocation, base, g.throttle_min, g.throttle_max, speeds[i], climb, wind, z, x, throttle, residuals[i]
-        )
+        # straight from level flight; where that wanders off, through steps of the climb that each start from the last
+        for stages in (1, 8):
+            z[:] = 0.0
+            z[0], z[1] = theta, phi
+            for stage in range(stages):
+                part = climb * (stage + 1.0) / stages
+                good = newton(
+                    plant,
+                    work,
+                    law.allocation,
+                    base,
+                    g.throttle_min,
+                    g.throttle_max,
+                    speeds[i],
+                    part,
+                    wind,
+                    z,
+                    x,
+                    throttle,
+                    residuals[i],
+                )
+            if good or climb == 0.0:
+                break
         good = good and throttle.min() >= g.throttle_min and throttle.max() <= g.throttle_max
         measure(x, y)
         memory[:] = 0.0
