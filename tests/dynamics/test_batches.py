@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from vehicles import K_T, rotor_table, vehicle
+from vehicles import K_T, POSITION, rotor_table, vehicle
 
 from levelone.dynamics import linearize, simulate
 from levelone.errors import InputError
 from levelone.handling.manoeuvres import Manoeuvre, step
 from levelone.status import Status
-from levelone.vehicle import VehicleBatch, vary
+from levelone.vehicle import PID, Vehicle, VehicleBatch, vary
 
 CRAFT = vehicle(rotors={"tau_d": 0.0137})
 TARGETS = ["M", "I_y", "K_T", "tau_d", "C_malpha"]
@@ -51,6 +51,43 @@ def test_a_list_of_vehicles_is_a_batch() -> None:
     listed = simulate([CRAFT, heavy], STEP)
     varied = simulate(vary(CRAFT, ["M"], np.array([[7.0], [8.0]]), 5.0), STEP)
     assert np.array_equal(listed.channels["q"], varied.channels["q"])
+
+
+def several_controllers() -> list[Vehicle]:
+    """Vehicles whose gains, rotor arms, motors and throttle curves differ, each with a controller designed for it."""
+    stretched = POSITION * np.array([1.3, 1.0, 1.0])
+    return [
+        CRAFT,
+        vehicle(law={"pitch": 6.0, "pitch_rate": PID(4.0, 3.0, 0.2, 0.03, 40.0), "command_lag": 0.1}),
+        vehicle(rotors={"position": stretched, "motor_lag": 0.03}),
+        vehicle(rotors={"throttle_exponent": 0.6, "tau_d": 0.021}),
+    ]
+
+
+def test_vehicles_with_controllers_of_their_own_fly_as_they_do_alone() -> None:
+    several = several_controllers()
+    together = simulate(several, STEP, chunk=3)
+    for run, alone in enumerate(several):
+        for name, values in simulate(alone, STEP).channels.items():
+            assert np.array_equal(values[0], together.channels[name][run]), (run, name)
+    last = together.channels["q"][:, 100:]
+    assert all(np.abs(last[0] - last[run]).max() > 1e-3 for run in (1, 2, 3))
+
+
+def test_each_linear_model_is_closed_by_its_own_controller() -> None:
+    several, omega = several_controllers(), np.array([0.5, 3.0, 12.0])
+    together = linearize(several, 5.0)
+    response = together.frequency_response("V_lon", "q", omega).value
+    for run, craft in enumerate(several):
+        alone = linearize(craft, 5.0)
+        np.testing.assert_allclose(alone.frequency_response("V_lon", "q", omega).value[0], response[run], rtol=1e-7)
+        assert alone.dominant("V_lon", "q") == pytest.approx(together.dominant("V_lon", "q", run), rel=1e-6)
+
+
+def test_rotors_at_other_places_are_refused_where_each_sees_its_own_flow() -> None:
+    crafts = [vehicle(rotors={"local_velocity": True, "position": POSITION * s}) for s in (1.0, 1.1)]
+    with pytest.raises(InputError, match=r"vehicles: 'test' has another rotors\.position"):
+        simulate(crafts, STEP)
 
 
 @given(st.permutations(range(9)))
@@ -96,9 +133,14 @@ def test_a_failed_first_run_spoils_no_linear_model() -> None:
 
 
 def test_runs_that_share_nothing_are_refused() -> None:
-    other = vehicle(rotors={"table": rotor_table(16.0)})
-    with pytest.raises(InputError, match="vehicles: 'test' has another controller"):
-        simulate([CRAFT, other], STEP)
+    others = {
+        "rotor table": vehicle(rotors={"table": rotor_table(16.0)}),
+        "controller rate": vehicle(law={"rate": 125.0}),
+        "controller's trim_speeds": vehicle(law={"trim_speeds": (-5.0, 15.0, 2.0)}),
+    }
+    for what, other in others.items():
+        with pytest.raises(InputError, match=f"vehicles: 'test' has another {what} than 'test'"):
+            simulate([CRAFT, other], STEP)
     with pytest.raises(InputError, match="vehicles: an empty list"):
         simulate([], STEP)
 

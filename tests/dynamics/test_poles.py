@@ -24,7 +24,7 @@ def delay_line(width: int, periods: int) -> control.StateSpace:
 
 def closed_loop(model: LinearModel) -> control.StateSpace:
     """Airframe, delay and controller joined by python-control; ideal sensors."""
-    n_u, late, law = model.B1.shape[2], int(model.whole_delay[0]), model.law
+    n_u, late, law = model.B1.shape[2], int(model.whole_delay[0]), model.law()
     both = np.hstack([model.B0[0], model.B1[0]])
     airframe = control.ss(model.A[0], both, model.C[0], np.zeros((len(model.C[0]), 2 * n_u)), PERIOD)
     old = delay_line(n_u, 1)
@@ -49,7 +49,7 @@ def test_poles_are_those_of_the_loop_that_python_control_closes(tau_d: float) ->
 def test_the_closed_frequency_response_is_that_of_python_control() -> None:
     """The loop closed at each frequency with z^-m against the state space with the delay as states; command at the throttles."""
     model = linearize(vehicle(rotors={"tau_d": 0.0137}), 5.0)
-    law, omega = model.law, np.array([0.3, 2.0, 6.0, 40.0])
+    law, omega = model.law(), np.array([0.3, 2.0, 6.0, 40.0])
     z = np.exp(1j * omega * PERIOD)
     loop = closed_loop(model)
     forward = [law.C @ np.linalg.solve(x * np.eye(len(law.A)) - law.A, law.Br[:, 3]) + law.Dr[:, 3] for x in z]
@@ -105,7 +105,7 @@ def test_sensor_lag_and_delay_move_the_poles_as_the_loop_closed_by_frequency_say
     model = linearize(craft, 5.0)
     pole = model.dominant("V_lon", "q")
     assert abs(pole - linearize(vehicle(rotors={"tau_d": 0.0137}), 5.0).dominant("V_lon", "q")) > 0.02
-    z, law = np.exp(pole * PERIOD), model.law
+    z, law = np.exp(pole * PERIOD), model.law()
     a, b0, b1 = model.lag_gain.T
     sensor = (b1 + (a * b1 + b0) / (z - a)) * z ** -model.sensor_delay.astype(float)
     feedback = (law.C @ np.linalg.solve(z * np.eye(len(law.A)) - law.A, law.B) + law.D) * sensor

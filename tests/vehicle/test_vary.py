@@ -122,10 +122,9 @@ def test_a_batch_of_unlike_vehicles_is_refused() -> None:
         return Vehicle("other", other.airframe, base.controller)
 
     unlike = {
-        "controller": vehicle(),
+        "controller rate": vehicle(law={"rate": 125.0}),
         "rotor table": like(rotors={"table": rotor_table(16.0)}),
         "rotors.axis": like(rotors={"axis": -base.airframe.rotors.axis}),
-        "rotors.position": like(rotors={"position": 1.1 * base.airframe.rotors.position}),
         "rotors.local_velocity": like(rotors={"local_velocity": True}),
         "set of schedule knots": like(knots=(0.0, 10.0)),
     }

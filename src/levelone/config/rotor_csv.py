@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -34,8 +35,13 @@ def read_rotor_table(path: Path, field: str = "rotors.table.file") -> RotorTable
     InputError
         Missing file or column, text in place of a number, NaN, nodes that are missing, given twice or not uniform.
     """
-    lines = read_text(path, field).splitlines()
-    where = f"{field}: {path.name}"
+    return _table(read_text(path, field), f"{field}: {path.name}")
+
+
+@lru_cache(maxsize=4)
+def _table(text: str, where: str) -> RotorTable:
+    """The table of a file's text; kept, since a study builds many vehicles from one file."""
+    lines = text.splitlines()
     comments = [line.lstrip("# ").rstrip() for line in lines if line.startswith("#")]
     rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.startswith("#")]
     if not rows:

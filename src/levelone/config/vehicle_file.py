@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib import resources
 from os import PathLike
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from levelone.config.changes import Change, changed
 from levelone.config.files import beside, file_hash, joint_hash, read_toml
 from levelone.config.quantities import Quantity, origins
 from levelone.config.rotor_csv import read_rotor_table
@@ -67,7 +69,7 @@ def vehicle_path(path_or_name: PathOrName) -> Path:
     return Path(text)
 
 
-def load_vehicle(path_or_name: PathOrName) -> Vehicle:
+def load_vehicle(path_or_name: PathOrName, changes: Mapping[str, Change] | None = None) -> Vehicle:
     """Read a vehicle.
 
     Parameters
@@ -75,6 +77,10 @@ def load_vehicle(path_or_name: PathOrName) -> Vehicle:
     path_or_name
         Path of a .toml file, or the name of a vehicle of the library (``"reference-evtol"``). Paths in the file are relative
         to it and stay in its folder. The format is described in docs/reference/vehicle-file.md.
+    changes
+        Entries of the file to change first, see :func:`levelone.config.changes.changed`:
+        ``{"controller.pitch_rate.Kp": 5.0, "rotors.position.x": 1.2}``. The controller is designed for the changed vehicle. The
+        vehicles of one file under any changes share its rotor table, so that they can be flown as one batch.
 
     Returns
     -------
@@ -87,7 +93,7 @@ def load_vehicle(path_or_name: PathOrName) -> Vehicle:
         One line with file, path of the value, what is wrong and what is allowed.
     """
     path = vehicle_path(path_or_name)
-    content = _content(path)
+    content = _content(path, changes)
     with in_file(path.name):
         assumed = tuple(_assumed(content))
         airframe = _airframe(content, path)
@@ -133,8 +139,12 @@ def vehicle_hash(path_or_name: PathOrName) -> str:
         return joint_hash([path, *(beside(path, name, f"rotors.table.{key}") for key, name in names)])
 
 
-def _content(path: Path) -> VehicleFile:
-    return check(VehicleFile, read_toml(path), path.name)
+def _content(path: Path, changes: Mapping[str, Change] | None = None) -> VehicleFile:
+    content = read_toml(path)
+    if changes:
+        with in_file(path.name):
+            content = changed(content, changes)
+    return check(VehicleFile, content, path.name)
 
 
 def _table(path: Path, name: str, field: str) -> RotorTable:
@@ -199,6 +209,7 @@ def _rotors(given: RotorGroup, path: Path) -> Rotors:
             T_u=given.T_u.value,
             tau_d=given.tau_d.value,
             motor_lag=given.motor_lag.value,
+            throttle_exponent=1.0 if given.throttle_exponent is None else given.throttle_exponent.value,
             local_velocity=given.velocity == "local",
         )
 

@@ -23,6 +23,7 @@ Seconds = Annotated[Quantity, si("s", sign="not negative")]
 Length = Annotated[Quantity, si("m", sign="positive")]
 SpeedLimit = Annotated[Quantity, si("m/s", sign="not negative")]
 Inertia = Annotated[Quantity, si("kg m^2", sign="positive")]
+Exponent = Annotated[Quantity, si("1", sign="positive")]
 ThrustCoefficient = Annotated[Quantity, si("N/rpm^2", sign="positive")]
 PerSecond = Annotated[Quantity, si("1/s", sign="not negative")]
 PerSecondSquared = Annotated[Quantity, si("1/s^2", sign="not negative")]
@@ -98,6 +99,7 @@ class RotorGroup(Origin):
     T_u: Fraction
     tau_d: Seconds
     motor_lag: Seconds
+    throttle_exponent: Exponent | None = None
     velocity: Literal["centre of gravity", "local"]
 
 

@@ -53,6 +53,16 @@ class Law(NamedTuple):
     trim: NDArray[np.float64]
 
 
+class Laws(NamedTuple):
+    """The controllers of a batch: the arrays of :class:`Law` with one more axis in front, and ``which`` [runs] flies each run."""
+
+    gains: NDArray[np.void]
+    pid: NDArray[np.float64]
+    allocation: NDArray[np.float64]
+    trim: NDArray[np.float64]
+    which: NDArray[np.int64]
+
+
 def gains_of(c: Controller) -> tuple[NDArray[np.void], NDArray[np.float64]]:
     """Gains as one record, and the PID loops [LOOPS, 5]."""
     m = c.design.mass

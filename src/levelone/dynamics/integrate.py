@@ -14,9 +14,10 @@ import numpy as np
 from levelone.compiled import inlined, innermost, kernel
 from levelone.dynamics import rotors as rot
 from levelone.dynamics.aerodynamics import drag_coefficient, reciprocal, sine_angle
-from levelone.dynamics.controller import control
+from levelone.dynamics.controller import C_VLON, control
 from levelone.dynamics.frames import euler_angles, heading_frame, to_body, to_earth
 from levelone.dynamics.model import N_STATE, Inputs, along, as_state, make_work, state_rate
+from levelone.dynamics.pilot import pilot_speed
 from levelone.status import Status
 from levelone.vehicle.vehicle import SENSOR_CHANNELS
 
@@ -140,10 +141,13 @@ def sense(y, lag_gain, lag_memory, delays, past, k, out):
 
 
 @innermost
-def ticks(plant, law, sensors, mode, commands, wind, trim_speed, climb, dt, rows, record, extremes, x, memory, work, loop):
+def ticks(
+    plant, law, sensors, mode, commands, wind, pilot, trim_speed, climb, dt, rows, record, asked, extremes, x, memory, work, loop
+):  # fmt: skip
     """The ticks of one trajectory, allocating nothing; returns a status code and the tick at which it was given."""
     lag_gain, delays, lag_memory, past = sensors
-    throttle, throttles, ring, y, seen, now = loop
+    throttle, throttles, ring, y, seen, now, command, sight = loop
+    piloted = len(asked) > 0
     n_ticks, n, period = commands.shape[0], len(throttle), law.gains.period
     late = plant.scalars.tau_d / period
     m = int(late)
@@ -158,7 +162,12 @@ def ticks(plant, law, sensors, mode, commands, wind, trim_speed, climb, dt, rows
         for row in range(len(rows)):
             record[row, k] = now[rows[row]]
         sense(y, lag_gain, lag_memory, delays, past, k, seen)
-        extremes[6] += control(law, mode, commands[k], trim_speed, climb, seen, memory, throttle)
+        for c in range(len(command)):
+            command[c] = commands[k, c]
+        if piloted:
+            asked[k] = pilot_speed(pilot, sight, k, y[0], y[3], trim_speed, asked[k - 1] if k > 0 else trim_speed, period)
+            command[C_VLON] += asked[k] - trim_speed
+        extremes[6] += control(law, mode, command, trim_speed, climb, seen, memory, throttle)
         for r in range(n):
             ring[k % RING, r] = throttle[r]
         inputs = Inputs(0.0, (0.0, 0.0, 0.0), here, slope)
@@ -168,11 +177,12 @@ def ticks(plant, law, sensors, mode, commands, wind, trim_speed, climb, dt, rows
 
 
 @kernel
-def fly(plant, law, sensors, mode, commands, wind, start, trim_speed, climb, dt, rows, record, extremes):
+def fly(plant, law, sensors, mode, commands, wind, pilot, start, trim_speed, climb, dt, rows, record, asked, extremes):
     """One closed-loop trajectory from a trimmed start; returns a status code. Ticks after a failure hold NaN.
 
     ``commands`` [ticks, COMMANDS]; ``wind`` [ticks or 1, 3] m/s north, east, down, linear between ticks; ``start`` holds state,
-    memory, throttles; ``rows`` says which channel each row of ``record`` [rows, ticks] takes.
+    memory, throttles; ``rows`` says which channel each row of ``record`` [rows, ticks] takes; ``asked`` [ticks] takes what the
+    pilot commands and is empty where none flies.
     """
     x, memory, throttle = start[0].copy(), start[1].copy(), start[2].copy()
     lag_gain, delays = sensors
@@ -185,10 +195,14 @@ def fly(plant, law, sensors, mode, commands, wind, start, trim_speed, climb, dt,
     past = np.empty((delays.max() + 1, N_SENSORS))
     past[:] = y
     unit = (lag_gain, delays, (1.0 - lag_gain[:, 2]) * y, past)
-    loop = (throttle, throttles, ring, y, seen, now)
+    sight = np.zeros((int(pilot.delay) + 1 if len(asked) > 0 else 0, 2))
+    loop = (throttle, throttles, ring, y, seen, now, np.empty(commands.shape[1]), sight)
     extremes[:] = np.array([np.inf, -np.inf, np.inf, -np.inf, np.inf, -np.inf, 0.0])
     status, reached = ticks(
-        plant, law, unit, mode, commands, wind, trim_speed, climb, dt, rows, record, extremes, x, memory, make_work(plant), loop
-    )
+        plant, law, unit, mode, commands, wind, pilot, trim_speed, climb, dt, rows, record, asked, extremes, x, memory,
+        make_work(plant), loop,
+    )  # fmt: skip
     record[:, reached:] = np.nan
+    if len(asked) > 0:
+        asked[reached:] = np.nan
     return status

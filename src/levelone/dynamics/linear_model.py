@@ -74,8 +74,8 @@ class LinearModel:
     ----------
     A, B0, B1, C
         [runs, n, n], [runs, n, rotors] (old and new command), [runs, channels, n].
-    law
-        The controller, the same for all.
+    laws, which
+        The controllers, and [runs] which one closes each loop.
     delay
         [runs] rotor delay, s.
     lag_gain, sensor_delay
@@ -92,7 +92,8 @@ class LinearModel:
     B0: FloatArray
     B1: FloatArray
     C: FloatArray
-    law: LinearLaw
+    laws: tuple[LinearLaw, ...]
+    which: NDArray[np.int64]
     delay: FloatArray
     lag_gain: FloatArray
     sensor_delay: NDArray[np.int64]
@@ -134,20 +135,20 @@ class LinearModel:
         if omega.max() >= np.pi / self.period:
             raise InputError("omega", f"{omega.max():.4g} rad/s reaches the Nyquist frequency of {np.pi / self.period:.4g} rad/s")
         z = np.exp(1j * omega * self.period)
-        feedback, forward = self._law_response(z, COMMANDS.index(command))
+        answers = [self._law_response(law, z, COMMANDS.index(command)) for law in self.laws]
         value = np.full((len(self.status), len(omega)), np.nan + 0j)
         good = np.flatnonzero(self.status == Status.OK)
 
         def work(part: slice) -> None:
             for run in good[part]:
+                feedback, forward = answers[self.which[run]]
                 value[run] = self._respond(int(run), z, feedback, forward, SENSOR_CHANNELS.index(output))
 
         run_chunks(work, len(good), threads_of(threads), chunk)
         return FrequencyResponse(omega, value)
 
-    def _law_response(self, z: ComplexArray, command: int) -> tuple[ComplexArray, ComplexArray]:
+    def _law_response(self, law: LinearLaw, z: ComplexArray, command: int) -> tuple[ComplexArray, ComplexArray]:
         """[nf, rotors, channels] feedback with the sensor unit, and [nf, rotors] feed-forward from the command."""
-        law = self.law
         resolvent = np.linalg.inv(z[:, None, None] * np.eye(len(law.A)) - law.A)
         a, b0, b1 = self.lag_gain.T
         sensor = (b1 + (a * b1 + b0) / (z[:, None] - a)) * z[:, None] ** -self.sensor_delay
@@ -186,23 +187,27 @@ class LinearModel:
         overshoot = np.where((z.imag > 1e-6) & (np.abs(z) > 1e-3), overshoot, 0.0)
         return complex(s[np.argmax(overshoot)]) if overshoot.max() > 0 else complex(np.nan, np.nan)
 
-    @cached_property
-    def _reach(self) -> FloatArray:
+    def law(self, run: int = 0) -> LinearLaw:
+        """The controller of one run."""
+        return self.laws[self.which[run]]
+
+    @staticmethod
+    def _reach(law: LinearLaw) -> FloatArray:
         """[rotors, r] orthonormal basis of the throttle changes that the controller can send; past ones are kept in it."""
-        u, size, _ = np.linalg.svd(np.hstack([self.law.C, self.law.D, self.law.Dr]))
+        u, size, _ = np.linalg.svd(np.hstack([law.C, law.D, law.Dr]))
         return u[:, : max(1, int(np.sum(size > 1e-10 * size[0])))]
 
-    @cached_property
-    def _kept(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def _kept(self, law: LinearLaw) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Channels whose lag, and whose delay, needs states: only those that the controller reads."""
-        read = np.any(self.law.B != 0.0, axis=0) | np.any(self.law.D != 0.0, axis=0)
+        read = np.any(law.B != 0.0, axis=0) | np.any(law.D != 0.0, axis=0)
         return np.flatnonzero(read & (self.lag_gain[:, 0] > 0.0)), np.flatnonzero(read & (self.sensor_delay > 0))
 
     def _lifted(self, run: int) -> FloatArray:
         """State matrix over (airframe, controller, past commands, sensor lags, past measurements)."""
-        law, C, reach = self.law, self.C[run], self._reach
+        law, C = self.law(run), self.C[run]
+        reach = self._reach(law)
         n, c, u, m = self.A.shape[1], len(law.A), reach.shape[1], int(self.whole_delay[run]) + 1
-        lags, delays = self._kept
+        lags, delays = self._kept(law)
         a, b0, b1 = self.lag_gain.T
         o_u, o_s = n + c, n + c + m * u
         starts = o_s + len(lags) + np.concatenate([[0], np.cumsum(self.sensor_delay[delays])]).astype(int)
@@ -233,12 +238,13 @@ class LinearModel:
 
     def _lifted_ports(self, run: int, command: int, output: int) -> tuple[FloatArray, FloatArray]:
         """Column by which the command enters the lifted state, and row that reads the output."""
-        n, c, reach, size = self.A.shape[1], len(self.law.A), self._reach, len(self._lifted(run))
+        law = self.law(run)
+        n, c, reach, size = self.A.shape[1], len(law.A), self._reach(law), len(self._lifted(run))
         drive, read = np.zeros(size), np.zeros(size)
-        direct = reach.T @ self.law.Dr[:, command]
+        direct = reach.T @ law.Dr[:, command]
         if self.whole_delay[run] == 0:
             drive[:n] = self.B1[run] @ reach @ direct
-        drive[n : n + c] = self.law.Br[:, command]
+        drive[n : n + c] = law.Br[:, command]
         drive[n + c : n + c + len(direct)] = direct
         read[:n] = self.C[run, output]
         return drive, read

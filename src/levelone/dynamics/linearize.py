@@ -8,6 +8,8 @@ half the step. Source of the method: Franklin, Powell and Workman, Digital Contr
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from levelone.compiled import kernel
@@ -17,7 +19,7 @@ from levelone.dynamics.integrate import N_SENSORS, measure, period_map
 from levelone.dynamics.linear_model import LinearLaw, LinearModel
 from levelone.dynamics.model import N_STATE, Inputs, Plant, make_work, plants_of
 from levelone.dynamics.simulate import check_before_flight, run_chunks, sensor_arrays, threads_of
-from levelone.dynamics.trim import Trim, law_of, run_trim
+from levelone.dynamics.trim import Trim, law_of, laws_of, run_trim, stacked
 from levelone.errors import unknown_name
 from levelone.handling.manoeuvres import Manoeuvre
 from levelone.status import Status
@@ -166,12 +168,12 @@ def linearize(
     axis = {"rate": "q", "attitude": "theta"}.get(flight_mode, "V_lon")
     hold = Manoeuvre("trim", flight_mode, axis, speed, climb, "none", dt=dt, controller_rate=controller.rate, wind=wind)  # type: ignore[arg-type]
     check_before_flight(batch, hold)
-    law = law_of(batch.nominal)
+    laws = laws_of(batch)
     n, n_u = len(batch), batch.nominal.n_rotors
     n_x = N_X + (n_u if batch.scalars["motor_lag"].max() > 0 else 0)
     matrices, sensed, error = np.empty((n, n_x, n_x + 2 * n_u)), np.empty((n, N_SENSORS, n_x)), np.empty(n)
     steps = np.concatenate([X_STEPS, np.full(n_x - N_X + 2 * n_u, U_STEP)])
-    start = run_trim(batch, law, np.full(n, float(speed)), float(climb), wind)
+    start = run_trim(batch, laws, np.full(n, float(speed)), float(climb), wind)
     status = start.status
     *differing, shared = plants_of(batch)
 
@@ -184,24 +186,49 @@ def linearize(
     error /= np.abs(matrices).max(axis=(1, 2))
     bad = (status == Status.OK) & ~((error < DIFFERENCE_LIMIT) & np.isfinite(matrices).all(axis=(1, 2)))
     status[bad] = FAILED
-    nominal = run_trim(batch_of(batch.nominal), law, np.full(1, float(speed)), float(climb), wind)
+    linear = linear_laws(batch, MODES.index(flight_mode), (float(speed), float(climb), wind))
+    known = np.array([bool(np.isfinite(law.D).all()) for law in linear])
+    status[(status == Status.OK) & ~known[batch.which]] = FAILED
     gain, late = sensor_arrays(batch.nominal.sensors, controller.period)
     return LinearModel(
         A=matrices[:, :, :n_x], B0=matrices[:, :, n_x : n_x + n_u], B1=matrices[:, :, n_x + n_u :], C=sensed,
-        law=linear_law(law, MODES.index(flight_mode), nominal, float(speed), float(climb)), delay=batch.scalars["tau_d"],
+        laws=linear, which=batch.which, delay=batch.scalars["tau_d"],
         lag_gain=gain, sensor_delay=late, period=controller.period, difference_error=error, status=status,
     )  # fmt: skip
 
 
+def linear_laws(
+    batch: VehicleBatch, mode: int, condition: tuple[float, float, tuple[float, float, float]]
+) -> tuple[LinearLaw, ...]:
+    """Derivatives of each controller at the trim of the vehicle it was designed for; inside its limits they hold everywhere.
+
+    NaN where that vehicle has no such trim.
+    """
+    speed, climb, wind = condition
+    found = []
+    for controller in batch.controllers:
+        design = batch_of(replace(batch.nominal, airframe=controller.design, controller=controller))
+        law = law_of(design.nominal)
+        start = run_trim(design, stacked([law], design.which), np.full(1, speed), climb, wind)
+        good = start.status[0] == Status.OK
+        found.append(linear_law(law, mode, start, speed, climb) if good else None)
+    return tuple(undefined_law(batch) if law is None else law for law in found)
+
+
+def undefined_law(batch: VehicleBatch) -> LinearLaw:
+    """A controller whose derivatives are not known: NaN."""
+    n_u, n_y, n_r = batch.nominal.n_rotors, N_SENSORS, len(COMMANDS)
+    return LinearLaw(*(np.full((rows, columns), np.nan) for rows in (N_C, n_u) for columns in (N_C, n_y, n_r)))
+
+
 def linear_law(law: Law, mode: int, start: Trim, speed: float, climb: float) -> LinearLaw:
-    """Derivatives of the controller at the first good trim; inside its limits it is the same for every airframe."""
-    first = int(np.argmax(start.status == Status.OK))
+    """Derivatives of a controller about the first trim in ``start``."""
     y = np.empty(N_SENSORS)
-    measure(start.state[first], y)
+    measure(start.state[0], y)
     n_u, n_r = len(law.allocation), len(COMMANDS)
     steps = np.concatenate([np.full(N_C, C_STEP), Y_STEPS, np.full(n_r, R_STEP)])
     place = np.zeros(len(steps))
     out = np.empty((N_C + n_u, len(steps)))
-    differentiate_law(law, mode, speed, climb, start.memory[first], y, place, steps, out)
+    differentiate_law(law, mode, speed, climb, start.memory[0], y, place, steps, out)
     a, b = N_C, N_C + N_SENSORS
     return LinearLaw(out[:a, :a], out[:a, a:b], out[:a, b:], out[a:, :a], out[a:, a:b], out[a:, b:])

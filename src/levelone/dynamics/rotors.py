@@ -33,6 +33,12 @@ def weights(t):
 
 
 @inlined
+def table_throttle(throttle, exponent):
+    """Throttle at which the table is entered."""
+    return throttle if exponent == 1.0 else max(throttle, 0.0) ** exponent
+
+
+@inlined
 def set_throttles(throttle, plant, work):
     """Prepare the force and moment of the rotors as sums over the table's throttle nodes; needed only when a throttle changes.
 
@@ -52,7 +58,7 @@ def set_throttles(throttle, plant, work):
     scale = plant.scalars.thrust_scale
     for r in range(len(throttle)):
         g = min(r, n_groups - 1)
-        i, t = cell(throttle[r], plant.grid[0, 0], plant.grid[0, 1], n_nodes)
+        i, t = cell(table_throttle(throttle[r], plant.scalars.throttle_exponent), plant.grid[0, 0], plant.grid[0, 1], n_nodes)
         low[g], high[g] = min(low[g], 2 * i), max(high[g], 2 * i + BLOCK)
         w = weights(t)
         for j in range(6):

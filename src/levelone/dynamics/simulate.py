@@ -9,18 +9,21 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from levelone.compiled import kernel
-from levelone.dynamics.controller import COMMANDS, MODES
+from levelone.dynamics.controller import COMMANDS, MODES, Law, Laws
 from levelone.dynamics.integrate import BUFFER, CHANNELS, EXTREMES, fly
 from levelone.dynamics.model import Plant, plants_of
-from levelone.dynamics.trim import law_of, run_trim
+from levelone.dynamics.pilot import pilot_numbers
+from levelone.dynamics.trim import laws_of, run_trim
 from levelone.errors import InputError, unknown_name
 from levelone.handling.history import TimeHistory
 from levelone.handling.manoeuvres import Manoeuvre
+from levelone.handling.pilot import Pilot
 from levelone.status import Status
 from levelone.vehicle import Sensors, Vehicle, VehicleBatch, batch_of
 from levelone.vehicle.tables import FloatArray
@@ -34,18 +37,28 @@ CHUNK = 32
 
 
 @kernel
-def fly_chunk(plants, law, sensors, mode, commands, wind, starts, speed, climb, dt, rows, records, extremes, status):
-    """Fly each airframe of a chunk from its trim; runs whose trim failed are left out."""
+def fly_chunk(
+    plants, laws, sensors, mode, commands, wind, pilot, starts, speed, climb, dt, rows, records, asked, extremes, status
+):  # fmt: skip
+    """Fly each airframe of a chunk from its trim; runs whose trim failed are left out.
+
+    ``asked`` [runs, ticks] takes the pilot's command; it has no ticks where there is no pilot.
+    """
     scalars, wrench, cubics, rest = plants
     states, memories, throttles = starts
     for i in range(len(scalars)):
         if status[i] != OK:
             records[i] = np.nan
             extremes[i] = np.nan
+            asked[i] = np.nan
             continue
         plant = Plant(scalars[i], wrench[i], cubics[i], *rest)
         start = (states[i], memories[i], throttles[i])
-        status[i] = fly(plant, law, sensors, mode, commands, wind, start, speed, climb, dt, rows, records[i], extremes[i])
+        k = laws.which[i]
+        law = Law(laws.gains[k], laws.pid[k], laws.allocation[k], laws.trim[k])
+        status[i] = fly(
+            plant, law, sensors, mode, commands, wind, pilot, start, speed, climb, dt, rows, records[i], asked[i], extremes[i]
+        )  # fmt: skip
 
 
 def sensor_arrays(sensors: Sensors, period: float) -> tuple[FloatArray, NDArray[np.int64]]:
@@ -133,6 +146,7 @@ def simulate(
     *,
     channels: Sequence[str] | None = None,
     gust: FloatArray | None = None,
+    pilot: Pilot | None = None,
     threads: int | None = None,
     chunk: int = CHUNK,
 ) -> TimeHistory:
@@ -141,13 +155,16 @@ def simulate(
     Parameters
     ----------
     vehicles
-        One vehicle, several that share controller and rotors, or a batch.
+        One vehicle, several as :func:`levelone.vehicle.batch_of` takes them, or a batch.
     manoeuvre
         What is commanded; its ``wind`` is steady.
     channels
         Which channels to keep (see :func:`channel_names`); all by default.
     gust
         [ticks, 3] wind on top of the steady one, north, east, down, m/s, linear between ticks.
+    pilot
+        Decelerates to a point ahead from the manoeuvre's ``on``; the manoeuvre holds its trim otherwise (shape "none", velocity
+        mode, no steady wind needed). ``V_lon_ref`` of the record is then what the pilot commanded, [run, time].
     threads, chunk
         How the batch is worked off; no influence on the results.
 
@@ -160,10 +177,11 @@ def simulate(
     Raises
     ------
     InputError
-        For what would fail in every run: see :func:`check_before_flight`.
+        For what would fail in every run: see :func:`check_before_flight` and :func:`levelone.dynamics.pilot.pilot_numbers`.
     """
     batch = batch_of(vehicles)
     check_before_flight(batch, manoeuvre)
+    hand = pilot_numbers(pilot, manoeuvre, batch.nominal.controller.period)
     names = channel_names(batch.nominal)
     wanted = tuple(channels) if channels is not None else names
     for name in wanted:
@@ -173,22 +191,30 @@ def simulate(
     rows = np.array([names.index(name) for name in wanted], dtype=np.int64)
     n = len(batch)
     records, extremes = np.empty((n, len(wanted), len(time))), np.empty((n, len(EXTREMES)))
-    law = law_of(batch.nominal)
+    asked = np.empty((n, len(time) if pilot is not None else 0))
+    laws = laws_of(batch)
     wind = wind_table(manoeuvre, gust)
     here = (float(wind[0, 0]), float(wind[0, 1]), float(wind[0, 2]))
     sensors = sensor_arrays(batch.nominal.sensors, batch.nominal.controller.period)
     condition = (float(manoeuvre.trim_speed), float(manoeuvre.trim_climb), float(manoeuvre.dt))
-    given = (law, sensors, MODES.index(manoeuvre.flight_mode), command_table(manoeuvre), wind)
-    start = run_trim(batch, law, np.full(n, condition[0]), condition[1], here)
+    given = (sensors, MODES.index(manoeuvre.flight_mode), command_table(manoeuvre), wind, hand)
+    start = run_trim(batch, laws, np.full(n, condition[0]), condition[1], here)
     *differing, shared = plants_of(batch)
 
     def work(part: slice) -> None:
         plants = (*(array[part] for array in differing), shared)
         starts = (start.state[part], start.memory[part], start.throttle[part])
-        fly_chunk(plants, *given, starts, *condition, rows, records[part], extremes[part], start.status[part])
+        flown = (records[part], asked[part], extremes[part], start.status[part])
+        fly_chunk(plants, select_laws(laws, part), *given, starts, *condition, rows, *flown)
 
     run_chunks(work, n, threads_of(threads), chunk)
-    return _history(batch, manoeuvre, wanted, records, extremes, start.status)
+    history = _history(batch, manoeuvre, wanted, records, extremes, start.status)
+    return history if pilot is None else replace(history, channels={**history.channels, "V_lon_ref": asked})
+
+
+def select_laws(laws: Laws, part: slice) -> Laws:
+    """The controllers of some of the runs."""
+    return laws._replace(which=laws.which[part])
 
 
 def run_chunks(work: Callable[[slice], None], n: int, threads: int, chunk: int) -> None:

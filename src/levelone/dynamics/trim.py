@@ -6,7 +6,8 @@ sideways ground speed zero. Residuals are forces over weight and moments over we
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ from levelone.dynamics.controller import (
     PHI_TRIM,
     THETA_TRIM,
     Law,
+    Laws,
     gains_of,
     read_trim,
     trim_place,
@@ -79,12 +81,15 @@ class Trim:
 
 
 @kernel
-def trim_chunk(plants, law, speeds, climb, wind, unknowns, residuals, states, memories, throttles, status):
+def trim_chunk(plants, laws, speeds, climb, wind, unknowns, residuals, states, memories, throttles, status):
     """Trim each airframe of a chunk at its own speed; fills the state, controller memory and throttles from which runs start."""
     scalars, wrench, cubics, rest = plants
-    g, n = law.gains, law.allocation.shape[0]
+    n = laws.allocation.shape[1]
     base, y = np.empty(n), np.empty(N_SENSORS)
     for i in range(len(scalars)):
+        k = laws.which[i]
+        law = Law(laws.gains[k], laws.pid[k], laws.allocation[k], laws.trim[k])
+        g = law.gains
         plant = Plant(scalars[i], wrench[i], cubics[i], *rest)
         work = make_work(plant)
         z, x, memory, throttle = unknowns[i], states[i], memories[i], throttles[i]
@@ -133,9 +138,20 @@ def trim_chunk(plants, law, speeds, climb, wind, unknowns, residuals, states, me
 
 def rotor_at_rest(plant: Plant) -> FloatArray:
     """[201, 3] throttle, thrust and torque of the table's rotor at zero airspeed."""
-    throttle = np.linspace(0.0, 1.0, 201)
-    spline = plant.spline.reshape(*plant.spline.shape[:2], -1, 2)[:, :, : -rot.BLOCK // 2]
-    return np.array([(t, *rot.read_table(np.ascontiguousarray(spline), plant.grid, t, 0.0, 0.0)) for t in throttle])
+    spline = np.ascontiguousarray(plant.spline.reshape(*plant.spline.shape[:2], -1, 2)[:, :, : -rot.BLOCK // 2])
+    curve = float(plant.scalars["throttle_exponent"])
+    return np.array([(t, *rot.read_table(spline, plant.grid, t**curve, 0.0, 0.0)) for t in np.linspace(0.0, 1.0, 201)])
+
+
+def stacked(laws: Sequence[Law], which: NDArray[np.int64]) -> Laws:
+    """Controllers side by side, and which of them flies each run."""
+    return Laws(*(np.stack(part) for part in zip(*laws, strict=True)), which)
+
+
+def laws_of(batch: VehicleBatch) -> Laws:
+    """The controllers of a batch; see :func:`law_of`."""
+    vehicles = [replace(batch.nominal, controller=controller) for controller in batch.controllers]
+    return stacked([law_of(vehicle) for vehicle in vehicles], batch.which)
 
 
 def law_of(vehicle: Vehicle) -> Law:
@@ -156,7 +172,7 @@ def law_of(vehicle: Vehicle) -> Law:
     gains, pid = gains_of(controller)
     start = Law(gains, pid, alloc, piecewise_cubics(speeds, np.tile(level, (len(speeds), 1))))
     everywhere = design.select(np.zeros(len(speeds), dtype=np.intp))
-    table = run_trim(everywhere, start, speeds)
+    table = run_trim(everywhere, stacked([start], everywhere.which), speeds)
     for i in np.flatnonzero(np.abs(table.residual).max(axis=1) > SETTLED):
         worst = AXES[int(np.argmax(np.abs(table.residual[i])))]
         raise InputError(
@@ -168,7 +184,7 @@ def law_of(vehicle: Vehicle) -> Law:
 
 def run_trim(
     batch: VehicleBatch,
-    law: Law,
+    laws: Laws,
     speeds: FloatArray,
     climb: float = 0.0,
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -178,7 +194,7 @@ def run_trim(
     unknowns, residual = np.empty((n, N_UNKNOWN)), np.empty((n, N_UNKNOWN))
     state, memory = np.empty((n, N_STATE)), np.empty((n, N_MEMORY))
     throttle, status = np.empty((n, batch.nominal.n_rotors)), np.empty(n, np.int64)
-    trim_chunk(plants_of(batch), law, speeds, float(climb), wind, unknowns, residual, state, memory, throttle, status)
+    trim_chunk(plants_of(batch), laws, speeds, float(climb), wind, unknowns, residual, state, memory, throttle, status)
     return Trim(state, unknowns[:, :2], unknowns[:, 2:], throttle, residual, status, memory)
 
 
@@ -207,7 +223,7 @@ def trim(
         A failed trim is NaN with the status ``TRIM_FAILED``; it keeps the residual of each axis.
     """
     batch = batch_of(vehicles)
-    found = run_trim(batch, law_of(batch.nominal), np.full(len(batch), float(speed)), climb, wind)
+    found = run_trim(batch, laws_of(batch), np.full(len(batch), float(speed)), climb, wind)
     for values in (found.state, found.attitude, found.mixer, found.throttle, found.memory):
         values[found.status != Status.OK] = np.nan
     return found

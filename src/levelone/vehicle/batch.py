@@ -1,4 +1,4 @@
-"""Vehicles as arrays for compiled code: many airframes that share a controller, a rotor table and the schedule's knots."""
+"""Vehicles as arrays for compiled code: many airframes that share a rotor table and the schedule's knots."""
 
 from __future__ import annotations
 
@@ -12,33 +12,35 @@ from numpy.typing import NDArray
 from levelone.errors import InputError, unknown_name
 from levelone.vehicle.mixer import effectiveness, pusher_effectiveness
 from levelone.vehicle.tables import FloatArray, piecewise_cubics
-from levelone.vehicle.vehicle import COEFFICIENTS, Vehicle
+from levelone.vehicle.vehicle import COEFFICIENTS, Controller, Vehicle
 
 SCALARS = (
     "mass", "I_xx", "I_yy", "I_zz", "I_xz", "area", "chord", "span", "air_density", "gravity",
-    "thrust_scale", "T_u", "tau_d", "motor_lag", "airspeed_min",
+    "thrust_scale", "T_u", "tau_d", "motor_lag", "throttle_exponent", "airspeed_min",
 )  # fmt: skip
 AIRFRAME_DTYPE = np.dtype([(name, np.float64) for name in SCALARS])
 
 # What a study may vary, and how it is found in a vehicle: name of the record's field, or a column of the schedule.
 TARGETS = {
     "M": "mass", "I_x": "I_xx", "I_y": "I_yy", "I_z": "I_zz", "I_xz": "I_xz", "rho": "air_density",
-    "K_T": "thrust_scale", "T_u": "T_u", "tau_d": "tau_d", "motor_lag": "motor_lag",
+    "K_T": "thrust_scale", "T_u": "T_u", "tau_d": "tau_d", "motor_lag": "motor_lag", "throttle_exponent": "throttle_exponent",
 } | {name: name for name in COEFFICIENTS}  # fmt: skip
 TARGET_UNITS = {
     "M": "kg", "I_x": "kg m^2", "I_y": "kg m^2", "I_z": "kg m^2", "I_xz": "kg m^2", "rho": "kg/m^3",
-    "K_T": "N/rpm^2", "T_u": "1", "tau_d": "s", "motor_lag": "s",
+    "K_T": "N/rpm^2", "T_u": "1", "tau_d": "s", "motor_lag": "s", "throttle_exponent": "1",
 } | {name: "1" if name.endswith("0") else "1/rad" for name in COEFFICIENTS}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class VehicleBatch:
-    """Airframes that differ in numbers only.
+    """Vehicles that differ in numbers only.
 
     Parameters
     ----------
     nominal
-        Supplies the controller, sensors, rotor table and rotor layout.
+        Supplies the sensors, the rotor table, and the layout where hubs see their own velocity.
+    controllers, which
+        The controllers of the batch, each with the vehicle it was designed for, and [n] which one flies each airframe.
     scalars
         [n] records of ``AIRFRAME_DTYPE``.
     wrench
@@ -48,6 +50,8 @@ class VehicleBatch:
     """
 
     nominal: Vehicle
+    controllers: tuple[Controller, ...]
+    which: NDArray[np.int64]
     scalars: NDArray[np.void]
     wrench: FloatArray
     cubics: FloatArray
@@ -73,11 +77,15 @@ class VehicleBatch:
 
     def select(self, index: slice | NDArray[np.intp]) -> VehicleBatch:
         """Some of the airframes."""
-        return replace(self, scalars=self.scalars[index], wrench=self.wrench[index], cubics=self.cubics[index])
+        arrays = {name: getattr(self, name)[index] for name in ("which", "scalars", "wrench", "cubics")}
+        return replace(self, **arrays)
 
 
 def batch_of(vehicles: Vehicle | VehicleBatch | Sequence[Vehicle]) -> VehicleBatch:
-    """Arrays of one vehicle or of several that share controller, sensors, rotor layout, rotor table, pushers and schedule knots.
+    """Arrays of one vehicle, or of several that share sensors, rotor table, pushers and schedule knots.
+
+    Controllers may differ in their gains and in the vehicle they were designed for, not in their rate or their table of trims;
+    rotors in their positions unless each hub sees its own velocity.
 
     Raises
     ------
@@ -94,8 +102,12 @@ def batch_of(vehicles: Vehicle | VehicleBatch | Sequence[Vehicle]) -> VehicleBat
         for what, same in _shared(first, other):
             if not same:
                 raise InputError("vehicles", f"{other.name!r} has another {what} than {first.name!r}")
+    controllers: dict[int, Controller] = {id(v.controller): v.controller for v in several}
+    places = list(controllers)
     return VehicleBatch(
         nominal=first,
+        controllers=tuple(controllers.values()),
+        which=np.array([places.index(id(v.controller)) for v in several], dtype=np.int64),
         scalars=np.array([_record(v) for v in several], dtype=AIRFRAME_DTYPE),
         wrench=np.stack([effectiveness(v.airframe.rotors) for v in several]),
         cubics=np.stack([v.airframe.aerodynamics.schedule.polynomials for v in several]),
@@ -105,11 +117,12 @@ def batch_of(vehicles: Vehicle | VehicleBatch | Sequence[Vehicle]) -> VehicleBat
 def _shared(first: Vehicle, other: Vehicle) -> Iterator[tuple[str, bool]]:
     """What the airframes of a batch have in common, and whether these two do."""
     a, b = first.airframe, other.airframe
-    yield "controller", other.controller is first.controller
+    yield "controller rate", first.controller.rate == other.controller.rate
+    yield "controller's trim_speeds", first.controller.trim_speeds == other.controller.trim_speeds
     for name in ("lag", "delay"):
         yield f"sensors.{name}", np.array_equal(getattr(first.sensors, name), getattr(other.sensors, name))
     yield "rotor table", a.rotors.table is b.rotors.table
-    for name in ("position", "axis", "local_velocity"):
+    for name in ("axis", "local_velocity", *(["position"] if a.rotors.local_velocity else [])):
         yield f"rotors.{name}", np.array_equal(getattr(a.rotors, name), getattr(b.rotors, name))
     yield "set of pushers", np.array_equal(pusher_effectiveness(a.pushers), pusher_effectiveness(b.pushers))
     yield "set of schedule knots", np.array_equal(a.aerodynamics.schedule.knots, b.aerodynamics.schedule.knots)
@@ -120,7 +133,8 @@ def _record(vehicle: Vehicle) -> tuple[float, ...]:
     m, aero, rotors = a.mass, a.aerodynamics, a.rotors
     return (
         m.mass, m.I_xx, m.I_yy, m.I_zz, m.I_xz, aero.area, aero.chord, aero.span, a.air_density, a.gravity,
-        rotors.K_T / rotors.K_T_table, rotors.T_u, rotors.tau_d, rotors.motor_lag, vehicle.validity.airspeed_min,
+        rotors.K_T / rotors.K_T_table, rotors.T_u, rotors.tau_d, rotors.motor_lag, rotors.throttle_exponent,
+        vehicle.validity.airspeed_min,
     )  # fmt: skip
 
 
@@ -181,6 +195,7 @@ def vary(vehicle: Vehicle, targets: Sequence[str], points: FloatArray, airspeed:
     shaped: Any = cubics.reshape(*cubics.shape[:2], n, -1)
     return replace(
         base,
+        which=np.zeros(n, dtype=np.int64),
         scalars=scalars,
         wrench=np.repeat(base.wrench, n, axis=0),
         cubics=np.ascontiguousarray(np.moveaxis(shaped, 2, 0)),
@@ -190,7 +205,7 @@ def vary(vehicle: Vehicle, targets: Sequence[str], points: FloatArray, airspeed:
 def _check_values(target: str, column: FloatArray) -> None:
     if not np.all(np.isfinite(column)):
         raise InputError(target, "values must be finite numbers")
-    if target in {"M", "I_x", "I_y", "I_z", "rho", "K_T", "T_u"} and column.min() <= 0:
+    if target in {"M", "I_x", "I_y", "I_z", "rho", "K_T", "T_u", "throttle_exponent"} and column.min() <= 0:
         raise InputError(target, f"must be positive, got {column.min()}")
     if target in {"tau_d", "motor_lag"} and column.min() < 0:
         raise InputError(target, f"must not be negative, got {column.min()}")

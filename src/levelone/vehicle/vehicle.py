@@ -102,6 +102,9 @@ class Rotors:
         First-order time constant of the rotors, s; 0 for none.
     local_velocity
         Whether each hub sees its own velocity (true) or that of the centre of gravity (false).
+    throttle_exponent
+        The table is entered with throttle ** throttle_exponent: 1 for a table measured on this vehicle's own throttle scale,
+        below 1 where thrust flattens out towards full throttle.
     """
 
     position: FloatArray
@@ -115,6 +118,7 @@ class Rotors:
     tau_d: float = 0.0
     motor_lag: float = 0.0
     local_velocity: bool = False
+    throttle_exponent: float = 1.0
 
     def __post_init__(self) -> None:
         n = len(self.position)
@@ -129,7 +133,7 @@ class Rotors:
             raise InputError("rotors.spin", f"must be +1 or -1, got {self.spin.tolist()}")
         if not np.allclose(np.linalg.norm(self.axis, axis=1), 1.0, atol=1e-9):
             raise InputError("rotors.axis", "must be unit vectors")
-        for name in ("K_T", "K_T_table", "T_u"):
+        for name in ("K_T", "K_T_table", "T_u", "throttle_exponent"):
             if not getattr(self, name) > 0:
                 raise InputError(f"rotors.{name}", f"must be positive, got {getattr(self, name)}")
         for name in ("tau_d", "motor_lag"):

@@ -1,0 +1,57 @@
+"""A pilot who captures a position: what is seen, how late, and what is asked of the inceptor.
+
+The crossover model's gain, lead and effective delay (McRuer and Krendel, Mathematical Models of Human Pilot Behavior, AGARDograph
+188, 1974, ch. II), closed on the distance to go of an aircraft whose inceptor commands ground speed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from levelone.errors import InputError
+
+
+@dataclass(frozen=True)
+class Pilot:
+    """Deceleration to a point ahead.
+
+    With e the distance to go seen ``delay`` seconds ago, the commanded forward ground speed is
+    gain * (e + lead * de/dt), kept between ``-reverse`` and the trim speed, and changes no faster than ``deceleration``.
+
+    Parameters
+    ----------
+    gain
+        1/s.
+    lead
+        s: how far ahead the distance is judged by its rate.
+    delay
+        s: effective delay of eye, mind and hand; rounded to whole control periods.
+    deceleration
+        m/s^2: fastest change of the commanded speed, either way.
+    reverse
+        m/s: largest rearward speed that is commanded.
+    distance
+        m: hover point ahead of the start of the record.
+
+    Raises
+    ------
+    InputError
+        A number is not finite, negative, or zero where it must not be.
+    """
+
+    gain: float
+    lead: float
+    delay: float
+    deceleration: float
+    reverse: float
+    distance: float
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not math.isfinite(value) or value < 0.0:
+                raise InputError(f"pilot.{field.name}", f"is {value:g}, must be finite and not negative")
+        for name in ("gain", "deceleration", "distance"):
+            if getattr(self, name) == 0.0:
+                raise InputError(f"pilot.{name}", "is 0, must be positive")
