@@ -18,7 +18,7 @@ from levelone.console import numbers, stage_bars
 from levelone.errors import InputError
 
 STUDY = Path(__file__).parents[1] / "studies" / "reference" / "study.toml"
-COMMANDS = ("run", "report", "trim", "simulate", "linearize")
+COMMANDS = ("run", "compare", "experiments", "calibrate", "report", "trim", "simulate", "linearize")
 
 
 def call(*arguments):
@@ -44,6 +44,7 @@ def files(tmp_path):
         shutil.copy(source.parent / name, folder)
     text = STUDY.read_text(encoding="utf-8").replace('vehicle = "reference-evtol"', f'vehicle = "{source.name}"')
     (folder / "study.toml").write_text(text, encoding="utf-8")
+    shutil.copy(STUDY.parent / "findings.toml", folder)
 
     def change(name="study.toml", old="", new=""):
         content = (folder / name).read_text(encoding="utf-8")
@@ -67,11 +68,16 @@ def finished(monkeypatch):
         (out / "results.json").write_text("{}")
         return out / "results.json"
 
-    def render_report(out):
+    def render_report(out, *, workers):
         calls.append(("report", out))
         return out / "report.html"
 
+    def compare(out):
+        calls.append(("compare", out))
+        return []
+
     monkeypatch.setattr("levelone.campaign.run_study", run_study)
+    monkeypatch.setattr("levelone.campaign.compare.compare", compare)
     monkeypatch.setattr("levelone.report.render_report", render_report)
     return calls
 
@@ -132,7 +138,8 @@ def test_an_output_folder_that_cannot_be_is_refused_before_any_work(finished, tm
 def test_run_calls_the_study_then_the_report(finished, tmp_path):
     done = call("run", STUDY, "--out", tmp_path / "out", "--seed", 7, "--threads", 1)
     assert done.exit_code == 0, done.output
-    assert finished == [("reference", tmp_path / "out", 7, 1), ("report", tmp_path / "out")]
+    out = tmp_path / "out"
+    assert finished == [("reference", out, 7, 1), ("compare", out), ("report", out)]
     assert str(tmp_path / "out" / "report.html") in done.stderr
 
 
@@ -301,7 +308,7 @@ def test_help_tells_a_newcomer_what_to_do_next():
     done = subprocess.run([sys.executable, "-m", "levelone.cli", "--help"], capture_output=True, text=True, check=True)
     shown = [line.split() for line in done.stdout.splitlines()]
     examples = [words for words in shown if words[:1] == ["levelone"]]
-    assert {words[1] for words in examples} == {"trim", "simulate", "linearize", "run"}
+    assert {words[1] for words in examples} == {"trim", "simulate", "linearize", "run", "compare", "calibrate"}
     assert set(COMMANDS) <= {words[0] for words in shown if words}
     folder = next(words[0] for words in shown if words and words[0].endswith("library"))
     assert (Path(folder) / "reference-evtol.toml").is_file()

@@ -2,14 +2,15 @@
 
     python tools/make_rotor_table.py
 
-writes reference-evtol-rotor.csv and reference-evtol-rotor-fine.csv into the vehicle library and prints a summary. The
+writes reference-evtol-rotor.csv, the same on a finer grid (-fine) and for a battery without resistance (-stiff, for experiments)
+into the vehicle library and prints a summary. The
 model is in bemt.py (rotor) and drive.py (motor and battery); docs/theory/rotor-table.md explains both.
 """
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -216,11 +217,16 @@ def main() -> None:
     for name, axes, values in (("", COARSE, table[::2, ::2, ::2]), ("-fine", FINE, table)):
         grid = " x ".join(str(a.size) for a in axes) + " nodes of throttle, airspeed and angle"
         write(out / f"reference-evtol-rotor{name}.csv", header(factor, constants, grid), axes, values)
+    stiff = replace(drive, battery_resistance=0.0)
+    values = make_table(load_map, stiff, FINE[0], FINE[1])[::2, ::2, ::2]
+    grid = f"a battery without resistance; {' x '.join(str(a.size) for a in COARSE)} nodes"
+    write(out / "reference-evtol-rotor-stiff.csv", header(factor, (blade, section, stiff), grid), COARSE, values)
     summary = {
         "raw C_T": static_thrust * np.pi**3 / 4.0,
         "raw C_P": static_torque * np.pi**4 / 4.0,
         "factor on thrust": factor,
         **hover_slopes(load_map, drive),
+        "d ln T / d ln throttle without sag": hover_slopes(load_map, stiff)["d ln T / d ln throttle"],
         **interpolation_errors(table),
     }
     for name, value in summary.items():

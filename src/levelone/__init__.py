@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from levelone.errors import InputError as InputError
     from levelone.errors import LeveloneError as LeveloneError
     from levelone.handling.bandwidth import bandwidth as bandwidth
+    from levelone.handling.coupling import coupling as coupling
     from levelone.handling.damping import dynamic_stability as dynamic_stability
     from levelone.handling.frequency import FrequencyResponse as FrequencyResponse
     from levelone.handling.history import TimeHistory as TimeHistory
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from levelone.handling.manoeuvres import step as step
     from levelone.handling.manoeuvres import sweep as sweep
     from levelone.handling.quickness import attitude_quickness as attitude_quickness
+    from levelone.handling.translation import translational_rate as translational_rate
     from levelone.status import Status as Status
     from levelone.uncertainty import Discrete as Discrete
     from levelone.uncertainty import Factor as Factor
@@ -72,6 +74,7 @@ _HOME = {
     "levelone.dynamics": ("linearize", "simulate", "trim"),
     "levelone.errors": ("InputError", "LeveloneError"),
     "levelone.handling.bandwidth": ("bandwidth",),
+    "levelone.handling.coupling": ("coupling",),
     "levelone.handling.damping": ("dynamic_stability",),
     "levelone.handling.frequency": ("FrequencyResponse",),
     "levelone.handling.history": ("TimeHistory",),
@@ -79,6 +82,7 @@ _HOME = {
     "levelone.handling.levels": ("Level",),
     "levelone.handling.manoeuvres": ("Manoeuvre", "pulse", "step", "sweep"),
     "levelone.handling.quickness": ("attitude_quickness",),
+    "levelone.handling.translation": ("translational_rate",),
     "levelone.status": ("Status",),
     "levelone.uncertainty": (
         "Discrete", "Factor", "FactorSpace", "Kriging", "LogNormal", "Normal", "Responses", "Triangular", "TruncatedNormal",

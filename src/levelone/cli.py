@@ -11,6 +11,7 @@ from levelone._version import __version__
 from levelone.console import (
     Commands,
     announce_compilation,
+    available,
     csv_draft,
     numbers,
     say,
@@ -25,6 +26,8 @@ What to do next:
   levelone simulate reference-evtol --speed 5     a step of forward speed, and what the criteria make of it
   levelone linearize reference-evtol --speed 5    poles of the closed loop
   levelone run studies/reference/study.toml       the whole study: a few minutes, ends with report.html
+  levelone compare results/reference              the published findings, decided on that run
+  levelone calibrate studies/reference/calibration.toml   how the unpublished numbers were found
 
 \b
 Your own aircraft: copy reference-evtol.toml and its two tables, change the numbers, and give the path of your
@@ -70,6 +73,8 @@ def run(
 
     checked = load_study(study)
     from levelone.campaign import run_study
+    from levelone.campaign.compare import compare as decide
+    from levelone.campaign.compare import in_one_line
     from levelone.campaign.store import prepare_folder
     from levelone.report import render_report
 
@@ -77,7 +82,61 @@ def run(
     announce_compilation()
     with stage_bars() as progress:
         results = run_study(checked, folder, seed=seed, threads=threads, progress=progress)
-    page = render_report(folder)
+    verdicts = in_one_line(decide(folder)) if checked.findings is not None else ""
+    page = render_report(folder, workers=min(threads or available(), 4))
+    say(f"results: {results}")
+    if checked.findings is not None:
+        say(f"findings: {verdicts}")
+    say(f"report:  {page}")
+
+
+@app.command()
+def compare(directory: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that a run has filled.")]) -> None:
+    """Decide the published study's findings on the results of a run; writes comparison.json."""
+    from levelone.campaign.compare import COMPARISON, in_one_line, verdict_columns
+    from levelone.campaign.compare import compare as decide
+
+    verdicts = decide(directory)
+    show("Findings", verdict_columns(verdicts))
+    say(in_one_line(verdicts))
+    say(f"comparison: {directory / COMPARISON}")
+
+
+@app.command()
+def experiments(
+    file: Annotated[Path, typer.Argument(metavar="EXPERIMENTS.toml", help="The file of experiments.")],
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="The record.  [default: experiments.json beside it]")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="In place of the study's seed.")] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Worker threads; no influence on the results.")] = None,
+) -> None:
+    """Run a study on changed vehicles, to find what its verdicts hang on; goes on where it was interrupted."""
+    from levelone.campaign.experiments import run_experiments
+
+    announce_compilation()
+    with stage_bars() as progress:
+        record = run_experiments(file, out, seed=seed, threads=threads, progress=progress)
+    say(f"experiments: {record}")
+
+
+@app.command()
+def calibrate(
+    file: Annotated[Path, typer.Argument(metavar="CALIBRATION.toml", help="The calibration file.")],
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of the results.  [default: results/NAME]")] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Worker threads; no influence on the results.")] = None,
+) -> None:
+    """Fit unpublished parameters of a vehicle to nominal handling qualities."""
+    from levelone.campaign.calibration_run import run_calibration
+    from levelone.campaign.models import RESPONSES
+    from levelone.config.calibration_file import load_calibration
+
+    checked = load_calibration(file, {name: unit for name, (unit, _) in RESPONSES.items()})
+    from levelone.report.calibration import render_calibration
+
+    folder = out if out is not None else Path("results") / checked.name
+    announce_compilation()
+    with stage_bars() as progress:
+        results = run_calibration(checked, folder, threads=threads, progress=progress)
+    page = render_calibration(folder)
     say(f"results: {results}")
     say(f"report:  {page}")
 
@@ -87,7 +146,7 @@ def report(directory: Annotated[Path, typer.Argument(metavar="DIR", help="Folder
     """Write the report of a finished study anew."""
     from levelone.report import render_report
 
-    say(f"report: {render_report(directory)}")
+    say(f"report: {render_report(directory, workers=min(available(), 4))}")
 
 
 @app.command()

@@ -27,6 +27,12 @@ class Status(IntEnum):
     RECORD_TOO_SHORT = 24
     NO_ATTITUDE_CHANGE = 25
     NOT_AT_TRIM = 26
+    NOT_CAPTURED = 27
+    NO_DECELERATION = 28
+    ON_AXIS_RETURNED = 30
+    NOT_SETTLED = 31
+    OTHER_FINAL_SPEED = 32
+    NO_STEADY_COMMAND = 33
     # the measurement on a frequency response
     NO_PHASE_CROSSING = 40
     NO_OMEGA_180 = 41
@@ -39,6 +45,7 @@ class Status(IntEnum):
     OUTSIDE_REQUIREMENT = 62
     NEGATIVE_DRAG = 63
     INCIDENCE_OUTSIDE = 64
+    LEVEL_2_AT_BEST = 65
 
     @property
     def text(self) -> str:
@@ -67,6 +74,12 @@ _TEXT = {
     Status.RECORD_TOO_SHORT: "the record ends before the response has been seen: lengthen the manoeuvre",
     Status.NO_ATTITUDE_CHANGE: "the attitude does not change: enlarge the input",
     Status.NOT_AT_TRIM: "the record is not steady before the input",
+    Status.NOT_CAPTURED: "the hover point was not captured in the adequate time: distance or speed did not stay within tolerance",
+    Status.NO_DECELERATION: "no deceleration was commanded: lengthen the record or shorten the distance",
+    Status.ON_AXIS_RETURNED: "the on-axis attitude is nearly back at trim at the end of the window: read the ratio to its peak",
+    Status.NOT_SETTLED: "the speed has not settled at the command when the record ends: lengthen the manoeuvre or damp the loop",
+    Status.OTHER_FINAL_SPEED: "the speed comes to rest at another value than was commanded: a limit or an unmodelled load holds it",
+    Status.NO_STEADY_COMMAND: "no constant change of speed is commanded at the end of the record: a step that stays is needed",
     Status.NO_PHASE_CROSSING: "the phase never crosses the 45 deg margin inside the record",
     Status.NO_OMEGA_180: "the phase never reaches -180 deg: phase delay and gain bandwidth are undefined",
     Status.RANGE_TOO_SHORT: "the response ends below 2 omega_180: phase delay cannot be read; extend the sweep",
@@ -77,4 +90,5 @@ _TEXT = {
     Status.OUTSIDE_REQUIREMENT: "outside the range in which the requirement is defined",
     Status.NEGATIVE_DRAG: "the linear drag went negative during the run: incidence below what the drag model can follow",
     Status.INCIDENCE_OUTSIDE: "incidence or sideslip left the stated validity of the linear aerodynamics",
+    Status.LEVEL_2_AT_BEST: "Level 1 is not met, and the requirement states no limit of Level 2: Level 2 at best",
 }

@@ -44,6 +44,7 @@ def study_file(tmp_path: Path) -> Changed:
 
     def write(*changes: tuple[str, str]) -> Path:
         path = tmp_path / "study.toml"
+        shutil.copy(STUDY.parent / "findings.toml", tmp_path)
         path.write_text(replaced(STUDY.read_text(encoding="utf-8"), changes), encoding="utf-8")
         return path
 

@@ -16,7 +16,7 @@ from levelone.handling.pilot import Pilot
 
 CRAFT = vehicle()
 PERIOD = 0.004
-PILOT = {"gain": 0.4, "lead": 0.5, "delay": 0.25, "deceleration": 1.0, "reverse": 1.0, "distance": 25.0}
+PILOT = {"gain": 0.4, "lead": 0.5, "delay": 0.25, "deceleration": 0.5, "reverse": 1.0, "distance": 40.0}
 
 
 def hold(speed: float = 5.0, duration: float = 30.0, **fields: object) -> Manoeuvre:
@@ -33,9 +33,10 @@ def wanted(history: TimeHistory, pilot: Pilot) -> np.ndarray:
     north, speed = history.channels["x_north"][0], history.channels["V_lon"][0]
     out = np.full(len(north), speed[0])
     for k in range(max(late, on), len(north)):
-        error, rate = pilot.distance - north[k - late], -speed[k - late]
-        free = np.clip(pilot.gain * (error + pilot.lead * rate), -pilot.reverse, speed[0])
-        out[k] = np.clip(free, out[k - 1] - pilot.deceleration * PERIOD, out[k - 1] + pilot.deceleration * PERIOD)
+        to_go = pilot.distance - north[k - late] - pilot.lead * speed[k - late]
+        near, a = pilot.deceleration / pilot.gain**2, pilot.deceleration
+        free = pilot.gain * to_go if to_go < near else np.sqrt(2.0 * a * to_go - a * near)
+        out[k] = np.clip(free, -pilot.reverse, speed[0])
     return out
 
 
@@ -49,9 +50,20 @@ def test_the_command_is_the_law_over_what_was_flown(gain: float, lead: float, de
 
 def test_the_aircraft_stops_at_the_point() -> None:
     history = flown(40.0)
-    assert history.channels["x_north"][0, -1] == pytest.approx(25.0, abs=0.02)
+    assert history.channels["x_north"][0, -1] == pytest.approx(40.0, abs=0.02)
     assert history.channels["V_lon"][0, -1] == pytest.approx(0.0, abs=0.01)
     assert np.array_equal(history.trim["V_lon_ref"], [5.0])
+
+
+@pytest.mark.theory
+def test_far_out_the_command_is_a_constant_deceleration() -> None:
+    """Speed squared falls linearly with the distance: by 2 a for each metre, to the last bit of what the delay lets through."""
+    history = flown(20.0, lead=0.0, delay=0.0)
+    to_go, command = 40.0 - history.channels["x_north"][0], history.channels["V_lon_ref"][0]
+    far = (to_go > 4.0) & (command < 5.0)
+    slope = np.diff(command[far] ** 2) / np.diff(to_go[far])
+    np.testing.assert_allclose(slope, 2.0 * 0.5, rtol=1e-6)
+    assert far.sum() > 1000
 
 
 def test_a_batch_of_piloted_runs_is_its_loop() -> None:

@@ -6,6 +6,7 @@ import copy
 import math
 import re
 import shutil
+from collections import defaultdict
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -17,6 +18,7 @@ import synthetic
 from levelone.errors import InputError
 from levelone.report import assumptions, render, style, svg, tables
 from levelone.report.charts import charts_of
+from levelone.report.page import environment
 from levelone.report.pictures import file_name, pictures
 from levelone.report.results import Results
 from levelone.report.screening import draw_screening
@@ -71,8 +73,8 @@ def walk(page: str) -> Walk:
 def page_without_pictures(results: Results) -> str:
     """The template alone: quick, for what does not concern figures."""
     context = render._context(results, charts_of(results.summary["study"]))
-    drawings: dict[str, list[Any]] = {criterion: [] for criterion in context["criteria"]}
-    return render._environment().get_template("report.html").render(**context, drawings=drawings)
+    drawings: dict[str, list[Any]] = defaultdict(list)
+    return environment().get_template("report.html").render(**context, drawings=drawings)
 
 
 def alter(results: Results, change: Any) -> Results:
@@ -192,7 +194,7 @@ def test_hostile_factor_name_is_drawn_as_text(results: Results, tmp_path: Path) 
     entry = copy.deepcopy(results.responses["zeta"])
     entry["morris"] = {HOSTILE + " -->": entry["morris"]["M"]}
     figure = draw_screening("zeta", entry)
-    style.save_svg(figure, tmp_path / "a.svg")
+    (tmp_path / "a.svg").write_bytes(style.svg_of(figure))
     walk = Walk(svg.inline((tmp_path / "a.svg").read_text(encoding="utf-8"), "a"))
     assert walk.wrong == []
     assert not {tag for tag, _, _ in walk.attributes} & {"script", "td"}
@@ -215,6 +217,15 @@ def test_same_results_give_the_same_bytes(folder: Path, page: str, tmp_path: Pat
     for name in names:
         assert (folder / "figures" / name).read_bytes() == (again / "figures" / name).read_bytes(), name
     assert steps == [("report", done, len(steps)) for done in range(1, len(steps) + 1)]
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_the_number_of_processes_changes_nothing(folder: Path, page: str, tmp_path: Path) -> None:
+    again = tmp_path / "again"
+    shutil.copytree(folder, again, ignore=shutil.ignore_patterns("figures", "report.html"))
+    assert render.render_report(again, workers=3).read_bytes() == page.encode()
+    names = sorted(item.name for item in (folder / "figures").iterdir())
+    assert all((folder / "figures" / name).read_bytes() == (again / "figures" / name).read_bytes() for name in names)
 
 
 def test_nothing_is_written_for_a_bad_folder(folder: Path, tmp_path: Path) -> None:

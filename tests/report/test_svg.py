@@ -15,7 +15,7 @@ def text(tmp_path: object) -> str:
         axes[0, 0].plot([0.0, 1.0, 2.0], [1.0, 0.0, 3.0], "o-")
         axes[0, 0].set_xlabel("a <b> -- c $\\mu^*$")
         path = tmp_path / "a.svg"  # type: ignore[operator]
-        style.save_svg(figure, path)
+        path.write_bytes(style.svg_of(figure))
     return path.read_text(encoding="utf-8")
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levelone.campaign.models import Assessment
 from levelone.handling.levels import Level
@@ -51,12 +52,13 @@ class Decomposition:
 
 def screen(design: Design, assessed: Assessment, policy: str, bootstrap: int) -> dict[str, MorrisIndices | None]:
     """Morris indices of each response; None where the policy refuses failed runs."""
-    out: dict[str, MorrisIndices | None] = {}
-    for name in assessed.responses.names:
-        values = assessed.responses.column(name)
-        refused = policy == "refuse" and bool(np.isnan(values).any())
-        out[name] = None if refused else morris(design, values, bootstrap=bootstrap, policy=policy)  # type: ignore[arg-type]
-    return out
+    return {name: screen_one(design, assessed.responses.column(name), policy, bootstrap) for name in assessed.responses.names}
+
+
+def screen_one(design: Design, values: FloatArray, policy: str, bootstrap: int) -> MorrisIndices | None:
+    """Morris indices of one response [runs]; None where the policy refuses failed runs."""
+    refused = policy == "refuse" and bool(np.isnan(values).any())
+    return None if refused else morris(design, values, bootstrap=bootstrap, policy=policy)  # type: ignore[arg-type]
 
 
 def decompose(
@@ -108,7 +110,11 @@ def statistics(values: FloatArray) -> Json:
 
 def outcomes(assessed: Assessment, name: str) -> tuple[Json, Json]:
     """Counts of failures and of cautions of one response, in words."""
-    counts = assessed.responses.counts(name)
+    return in_words(assessed.responses.counts(name))
+
+
+def in_words(counts: Mapping[Status, int]) -> tuple[Json, Json]:
+    """Counts of statuses as words: of failures, and of cautions."""
     failures = {s.text: c for s, c in counts.items() if s.failed}
     cautions = {s.text: c for s, c in counts.items() if not s.failed and s is not Status.OK}
     return failures, cautions
@@ -167,12 +173,15 @@ def agreement(screened: MorrisIndices | None, found: SobolIndices) -> float:
 def level_shares(assessed: Assessment) -> Json:
     """Share of samples at each Level, outside the requirement's range and failed, for each criterion and for the worst of them."""
     names = list(LEVEL_KEYS.values())
-    out: Json = {}
-    for criterion, codes in assessed.levels.items():
-        found = shares([LEVEL_KEYS[Level(int(code))] for code in codes], names)
-        out[criterion] = {"n": found.n} | dict(zip(names, found.share.tolist(), strict=True))
-        out[criterion]["level_1_ci"] = found.ci[0].tolist()
+    out: Json = {criterion: shares_json(codes) for criterion, codes in assessed.levels.items()}
     beyond = shares([LEVEL_KEYS[Level(int(code))] for code in assessed.extrapolated], names)
     kept: Sequence[str] = names[:3]
     out["attitude_quickness"]["extrapolated"] = {k: float(v) for k, v in zip(names, beyond.share, strict=True) if k in kept}
     return out
+
+
+def shares_json(codes: NDArray[np.int64]) -> Json:
+    """Shares of one criterion's Levels, with the interval of Level 1."""
+    names = list(LEVEL_KEYS.values())
+    found = shares([LEVEL_KEYS[Level(int(code))] for code in codes], names)
+    return {"n": found.n} | dict(zip(names, found.share.tolist(), strict=True)) | {"level_1_ci": found.ci[0].tolist()}

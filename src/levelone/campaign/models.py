@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 from levelone.dynamics import linearize, simulate
 from levelone.dynamics.simulate import chunks
 from levelone.errors import unknown_name
-from levelone.handling.bandwidth import bandwidth
+from levelone.handling.bandwidth import Bandwidth, bandwidth
 from levelone.handling.damping import DynamicStability, dynamic_stability
 from levelone.handling.history import TimeHistory
 from levelone.handling.levels import Boundaries, load_boundaries, worst
-from levelone.handling.manoeuvres import Manoeuvre, pulse, step
+from levelone.handling.manoeuvres import Manoeuvre, Start, pulse, step
 from levelone.handling.picks import flag_changed_choice
 from levelone.handling.quickness import Quickness, attitude_quickness
+from levelone.handling.translation import translational_rate
 from levelone.status import CAUTIONS, Status
 from levelone.uncertainty import Responses
 from levelone.vehicle import TARGETS, Validity, Vehicle, VehicleBatch, batch_of, vary
@@ -37,9 +38,12 @@ RESPONSES = {
     "tau_p": ("s", "bandwidth"),
     "omega_bw_attitude": ("rad/s", "bandwidth"),
     "tau_p_attitude": ("s", "bandwidth"),
+    "rise_time": ("s", "translational_rate"),
+    "overshoot": ("1", "translational_rate"),
 }
-CRITERIA = ("attitude_quickness", "dynamic_stability", "bandwidth", "worst")
-CHANNELS = ("q", "theta")
+#: "worst" is that of the three criteria before it, which the study is about
+CRITERIA = ("attitude_quickness", "dynamic_stability", "bandwidth", "worst", "translational_rate")
+CHANNELS = ("q", "theta", "V_lon")
 CHUNK = 64
 
 
@@ -94,6 +98,8 @@ class BuiltinModel:
         Level boundaries.
     task
         Which bandwidth chart sets the Level.
+    start
+        From which trim a varied vehicle begins, see :func:`levelone.dynamics.simulate`.
     threads
         Worker threads; no influence on the results.
 
@@ -110,6 +116,7 @@ class BuiltinModel:
     omega: FloatArray = field(default_factory=lambda: np.geomspace(0.1, 300.0, 400))
     boundaries: Boundaries = field(default_factory=load_boundaries)
     task: str = "all_other"
+    start: Start = "own trim"
     threads: int | None = None
 
     def __post_init__(self) -> None:
@@ -130,7 +137,7 @@ class BuiltinModel:
 
     def fly(self, batch: VehicleBatch, manoeuvre: Manoeuvre, channels: tuple[str, ...] = CHANNELS) -> TimeHistory:
         """Time history of a batch under one of the manoeuvres."""
-        return simulate(batch, manoeuvre, channels=channels, threads=self.threads)
+        return simulate(batch, manoeuvre, channels=channels, start=self.start, threads=self.threads)
 
     def batch(self, points: ArrayLike) -> VehicleBatch:
         """One airframe for each point."""
@@ -147,13 +154,13 @@ class BuiltinModel:
         """
         parts = []
         for part in chunks(len(points), chunk):
-            parts.append(self._assess(self.batch(points[part])))
+            parts.append(self.assess_batch(self.batch(points[part])))
             progress(part.stop)
         return _joined(parts)
 
     def nominal(self) -> Assessment:
         """The assessment of the nominal vehicle itself."""
-        return self._assess(batch_of(self.vehicle))
+        return self.assess_batch(batch_of(self.vehicle))
 
     def _quickness(self, history: TimeHistory) -> Quickness:
         return attitude_quickness(history, "pitch", boundaries=self.boundaries)
@@ -161,18 +168,13 @@ class BuiltinModel:
     def _stability(self, history: TimeHistory) -> DynamicStability:
         return dynamic_stability(history, "pitch", boundaries=self.boundaries)
 
-    def _assess(self, batch: VehicleBatch) -> Assessment:
+    def assess_batch(self, batch: VehicleBatch) -> Assessment:
         stepped, pulsed = self.fly(batch, self.step), self.fly(batch, self.pulse)
         quick = flag_changed_choice(self._quickness(stepped), self.reference[0])
         damped = flag_changed_choice(self._stability(pulsed), self.reference[1])
-        model = linearize(batch, self.step.trim_speed, flight_mode=self.step.flight_mode, dt=self.step.dt, threads=self.threads)
-        readings = []
-        for output in ("q", "theta"):
-            response = model.frequency_response("V_lon", output, self.omega, threads=self.threads)
-            response = response if output == "q" else -response
-            readings.append(bandwidth(response, "attitude_command", task=self.task, boundaries=self.boundaries))
-        study, attitude = readings
-        run, validity = np.where(model.status == Status.OK, 0, model.status), self.vehicle.validity
+        moved = translational_rate(stepped, "V_lon", boundaries=self.boundaries)
+        (study, attitude), run = self.linear_readings(batch, ("q", "theta"))
+        validity = self.vehicle.validity
         columns = {
             "quickness": (quick.quickness, doubted(quick.status, stepped, validity)),
             "delta_theta_min": (quick.delta_theta_min, doubted(quick.status_min, stepped, validity)),
@@ -183,14 +185,27 @@ class BuiltinModel:
             "tau_p": (study.tau_p, np.where(run, run, study.status_tau_p)),
             "omega_bw_attitude": (attitude.omega_bw, np.where(run, run, attitude.status)),
             "tau_p_attitude": (attitude.tau_p, np.where(run, run, attitude.status_tau_p)),
+            "rise_time": (moved.rise_time, doubted(moved.status, stepped, validity)),
+            "overshoot": (moved.overshoot, doubted(moved.status, stepped, validity)),
         }
         levels = {"attitude_quickness": quick.level, "dynamic_stability": damped.level, "bandwidth": attitude.level}
         return Assessment(
-            _responses(columns),
-            levels | {"worst": worst(*levels.values())},
+            responses_of(columns),
+            levels | {"worst": worst(*levels.values()), "translational_rate": moved.level},
             quick.level_extrapolated,
             {"attitude_quickness": stepped.extremes, "dynamic_stability": pulsed.extremes},
         )
+
+    def linear_readings(self, batch: VehicleBatch, outputs: tuple[str, ...]) -> tuple[list[Bandwidth], IntArray]:
+        """Bandwidth read on the linear response of each output, ``"q"`` (q / V_lon) or ``"theta"`` (-theta / V_lon), and
+        [run] why a linearisation failed, 0 where it stands."""
+        model = linearize(batch, self.step.trim_speed, flight_mode=self.step.flight_mode, dt=self.step.dt, threads=self.threads)
+        readings = []
+        for output in outputs:
+            response = model.frequency_response("V_lon", output, self.omega, threads=self.threads)
+            response = response if output == "q" else -response
+            readings.append(bandwidth(response, "attitude_command", task=self.task, boundaries=self.boundaries))
+        return readings, np.where(model.status == Status.OK, 0, model.status)
 
     def at_half_step(self) -> BuiltinModel:
         """The same model integrated with half the step."""
@@ -214,7 +229,8 @@ def doubted(status: IntArray, history: TimeHistory, validity: Validity) -> IntAr
     return np.where(status == Status.OK, flagged, status)
 
 
-def _responses(columns: Mapping[str, tuple[FloatArray, IntArray]]) -> Responses:
+def responses_of(columns: Mapping[str, tuple[FloatArray, IntArray]]) -> Responses:
+    """Values with their statuses, [n] each, under the units of ``RESPONSES``; what failed becomes NaN."""
     status = np.column_stack([np.asarray(codes, dtype=np.int64) for _, codes in columns.values()])
     values = np.column_stack([value for value, _ in columns.values()])
     stands = np.isin(status, [int(Status.OK), *(int(code) for code in CAUTIONS)])

@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-import datetime
-import platform
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
-import scipy
-from numpy.typing import NDArray
 
-from levelone._version import __version__
 from levelone.campaign import analysis
-from levelone.campaign.describe import describe_study, provenance_hashes
+from levelone.campaign.checks import confidences, numerics, provenance, validity
+from levelone.campaign.compare import take_along
+from levelone.campaign.describe import describe_study
 from levelone.campaign.models import RESPONSES, Assessment, BuiltinModel
 from levelone.campaign.pictures import frequency_groups, history_groups
+from levelone.campaign.sections import run_sections
 from levelone.campaign.store import prepare_folder, write_groups, write_json, write_sample
 from levelone.campaign.sweep import SweepCheck, sweep_check
 from levelone.config.study_file import Study
-from levelone.config.vehicle_file import load_fine_table, with_table
 from levelone.dynamics import trim
 from levelone.status import Status
 from levelone.uncertainty import Design, latin_hypercube, morris_design, sobol_design, stage_seed
-from levelone.vehicle import Vehicle
-from levelone.vehicle.tables import FloatArray
 
 SCHEMA = 1
 Progress = Callable[[str, int, int], None]
@@ -59,6 +53,7 @@ def build_model(study: Study, threads: int | None = None) -> BuiltinModel:
         omega=study.omega,
         boundaries=study.boundaries,
         task=study.task,
+        start=study.start,
         threads=threads,
     )
 
@@ -117,6 +112,8 @@ def run_study(
         found = analysis.decompose(
             sample, assessed, base, study.policy, stage_seed(seed, "surrogates"), study.method.bootstrap, options, threads, progress
         )
+    with clock.stage("sections"):
+        sections = run_sections(study, model, sample, assessed, seed, progress)
     with clock.stage("numerics"):
         progress("numerics", 0, 1)
         checks = numerics(study, model, nominal, swept)
@@ -125,7 +122,9 @@ def run_study(
         write_sample(folder, "morris", screening, screened)
         write_sample(folder, "monte_carlo", sample, assessed)
         write_groups(folder / "histories.nc", history_groups(model, sample, swept))
-        write_groups(folder / "frequency.nc", frequency_groups(swept))
+        write_groups(folder / "frequency.nc", frequency_groups(swept) | dict(sections.frequency))
+        for name, groups in sections.files.items():
+            write_groups(folder / name, groups)
     results: dict[str, Any] = {
         "schema": SCHEMA,
         "study": describe_study(study, seed),
@@ -135,10 +134,12 @@ def run_study(
         "numerics": checks,
         "sweep": swept.summary(),
         "validity": validity(study.vehicle, assessed),
-        "assumed": [{"field": name, "why": why} for name, why in study.vehicle.assumed],
+        **sections.results,
+        **take_along(study, folder),
+        "assumed": [{"field": name, "why": why} for name, why in (*study.vehicle.assumed, *study.assumed)],
         "not_validated": list(study.not_validated),
         "validity_domain": list(study.validity_domain),
-        "provenance": provenance(study, seed, clock),
+        "provenance": provenance(study, seed, clock.seconds),
     }
     write_json(folder / "results.json", results)
     return folder / "results.json"
@@ -158,10 +159,11 @@ def response_results(
     assessed: Assessment,
     found: analysis.Decomposition,
 ) -> dict[str, Any]:
-    """The block of each response in results.json."""
+    """The block of each response in results.json, for those that were decomposed."""
     effects = analysis.screen(screening, screened, study.policy, study.method.bootstrap)
     out: dict[str, Any] = {}
-    for j, (name, (unit, criterion)) in enumerate(RESPONSES.items()):
+    for j, name in enumerate(assessed.responses.names):
+        unit, criterion = RESPONSES[name]
         failures, cautions = analysis.outcomes(assessed, name)
         block: dict[str, Any] = {
             "unit": unit,
@@ -207,87 +209,3 @@ def nominal_results(model: BuiltinModel, swept: SweepCheck) -> dict[str, Any]:
         "omega_180_attitude": float(attitude.omega_180),
         "omega_180": float(swept.linear_reading["q"].omega_180),
     }
-
-
-def numerics(study: Study, model: BuiltinModel, nominal: Assessment, swept: SweepCheck) -> dict[str, Any]:
-    """Change of each nominal value at half the step, with another spectral window, and with the finer rotor table."""
-    half = model.at_half_step().nominal().responses
-    other = tuple(0.7 * w for w in study.windows)
-    window = sweep_check(model, study.sweep, other).swept_reading
-    fine_table = load_fine_table(study.vehicle_path)
-    fine = None
-    if fine_table is not None:
-        fine = replace(model, vehicle=with_table(study.vehicle, fine_table)).nominal().responses
-    spectral = {
-        "omega_bw": float(window.omega_bw) - float(swept.swept_reading.omega_bw),
-        "tau_p": float(window.tau_p) - float(swept.swept_reading.tau_p),
-    }
-    out: dict[str, Any] = {}
-    for name in RESPONSES:
-        here = float(nominal.responses.column(name)[0])
-        out[name] = {
-            "half_step": float(half.column(name)[0]) - here,
-            "window": spectral.get(name, np.nan),
-            "window_status": "change of the swept reading" if name in spectral else "uses no spectra",
-            "finer_table": np.nan if fine is None else float(fine.column(name)[0]) - here,
-            "finer_table_status": "the vehicle has no finer table" if fine is None else "ok",
-        }
-    return out
-
-
-def validity(vehicle: Vehicle, assessed: Assessment) -> dict[str, Any]:
-    """How many runs left the stated validity of the aerodynamics, and how far: in either manoeuvre, and in each."""
-    marks = {name: _marks(vehicle, extremes) for name, extremes in assessed.extremes.items()}
-    either = {key: np.any([m[key] for m in marks.values()], axis=0) for key in next(iter(marks.values()))}
-    everything = {
-        key: np.concatenate([x[key] for x in assessed.extremes.values()]) for key in ("alpha_min", "alpha_max", "C_D_min")
-    }
-    return _reach(everything) | _counts(either) | {name: _reach(assessed.extremes[name]) | _counts(m) for name, m in marks.items()}
-
-
-def _marks(vehicle: Vehicle, x: Mapping[str, FloatArray]) -> dict[str, NDArray[np.bool_]]:
-    v = vehicle.validity
-    with np.errstate(invalid="ignore"):
-        return {
-            "negative_drag_runs": x["C_D_min"] < 0,
-            "alpha_outside_runs": (x["alpha_min"] < v.alpha[0]) | (x["alpha_max"] > v.alpha[1]),
-            "beta_outside_runs": (x["beta_min"] < v.beta[0]) | (x["beta_max"] > v.beta[1]),
-            "saturated_runs": x["saturated"] > 0,
-        }
-
-
-def _counts(marks: Mapping[str, NDArray[np.bool_]]) -> dict[str, int]:
-    return {key: int(mark.sum()) for key, mark in marks.items()} | {"n": len(next(iter(marks.values())))}
-
-
-def _reach(x: Mapping[str, FloatArray]) -> dict[str, float]:
-    """Extremes over the runs that flew; NaN where none did."""
-
-    def of(pick: Callable[..., Any], values: FloatArray) -> float:
-        flown = values[np.isfinite(values)]
-        return float(pick(flown)) if flown.size else float("nan")
-
-    return {
-        "alpha_min_deg": float(np.degrees(of(np.min, x["alpha_min"]))),
-        "alpha_max_deg": float(np.degrees(of(np.max, x["alpha_max"]))),
-        "C_D_min": of(np.min, x["C_D_min"]),
-    }
-
-
-def confidences(study: Study) -> dict[str, str]:
-    """Confidence of the boundary that each criterion is judged by."""
-    b = study.boundaries
-    return {
-        "attitude_quickness": b.chart("attitude_quickness", "pitch").confidence,
-        "dynamic_stability": f"zeta line {b.dynamic_stability.confidence_zeta_1}, other limits {b.dynamic_stability.confidence}",
-        "bandwidth": b.chart("bandwidth", study.task).confidence,
-    }
-
-
-def provenance(study: Study, seed: int, clock: Clock) -> dict[str, Any]:
-    """Versions, seed, hashes and wall times."""
-    return {
-        "levelone": __version__, "python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__,
-        "numba": numba.__version__, "platform": platform.platform(), "seed": seed, **provenance_hashes(study),
-        "wall_s": clock.seconds, "finished": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
-    }  # fmt: skip

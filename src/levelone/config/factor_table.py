@@ -3,20 +3,87 @@
 from __future__ import annotations
 
 import math
-from dataclasses import MISSING, fields
+from collections.abc import Sequence
+from dataclasses import MISSING, dataclass, fields
 from typing import Any
 
-from levelone.config.study_schema import FactorTable
+import numpy as np
+
+from levelone.config.study_schema import FactorTable, in_words
 from levelone.config.units import to_si
 from levelone.errors import InputError, unknown_name
-from levelone.uncertainty import DISTRIBUTIONS, Distribution, Factor, uniform_around
-from levelone.vehicle import TARGET_UNITS, TARGETS, Vehicle, nominal_value
+from levelone.handling.history import FloatArray
+from levelone.handling.manoeuvres import Manoeuvre
+from levelone.uncertainty import DISTRIBUTIONS, Distribution, Factor, FactorSpace, uniform_around
+from levelone.vehicle import TARGET_UNITS, TARGETS, Vehicle, nominal_value, vary
 
 #: relative difference at which a study's value no longer counts as that of its vehicle
 SAME_VALUE = 1e-9
 
 
-def factor_of(table: FactorTable, vehicle: Vehicle, airspeed: float) -> tuple[Factor, str, float]:
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """Factors, the targets that they set, and their nominal values in the vehicle (read-only)."""
+
+    space: FactorSpace
+    targets: tuple[str, ...]
+    nominal: FloatArray
+
+
+def inputs_of(tables: Sequence[tuple[str, FactorTable]], vehicle: Vehicle, airspeed: float) -> Inputs:
+    """The factors of a study.
+
+    Parameters
+    ----------
+    tables
+        Path of each entry in the file, for errors, and the entry.
+    vehicle, airspeed
+        As for :func:`factor_of`.
+
+    Raises
+    ------
+    InputError
+        As for :func:`factor_of`; a target that two factors set, a name given twice, a distribution without ends.
+    """
+    factors, targets, nominal = zip(*(factor_of(table, vehicle, airspeed, path) for path, table in tables), strict=True)
+    for (path, _), factor in zip(tables, factors, strict=True):
+        first = next(each for each in factors if each.target == factor.target)
+        if first is not factor:
+            raise InputError(path, f"sets {factor.target} as the factor {first.name} does; each target may be set once")
+    space = FactorSpace(factors)
+    space.require_bounded("a Morris design")
+    values = np.array(nominal)
+    values.setflags(write=False)
+    return Inputs(space, targets, values)
+
+
+def check_corners(inputs: Inputs, paths: Sequence[str], vehicle: Vehicle, manoeuvres: tuple[Manoeuvre, ...]) -> None:
+    """Refuse a box whose lowest or highest corner is no vehicle, or leaves what every run needs.
+
+    Parameters
+    ----------
+    inputs
+        The factors.
+    paths
+        Path of each factor's entry in the file, in their order.
+    vehicle
+        The nominal vehicle.
+    manoeuvres
+        What it is to fly, all from one trim.
+    """
+    from levelone.dynamics.simulate import check_before_flight
+
+    corners = inputs.space.transform(np.array([[0.0], [1.0]]) * np.ones(len(inputs.space)))
+    try:
+        batch = vary(vehicle, inputs.targets, corners, manoeuvres[0].trim_speed)
+    except InputError as error:
+        where = dict(zip(inputs.targets, paths, strict=True))
+        raise InputError(f"{where[error.field]}.range" if error.field in where else error.field, error.problem) from None
+    for flown in manoeuvres:
+        check_before_flight(batch, flown)
+
+
+def factor_of(table: FactorTable, vehicle: Vehicle, airspeed: float, path: str | None = None) -> tuple[Factor, str, float]:
     """The factor, its target, and its nominal value in the vehicle.
 
     Parameters
@@ -27,13 +94,15 @@ def factor_of(table: FactorTable, vehicle: Vehicle, airspeed: float) -> tuple[Fa
         The nominal vehicle, whose value must be the one that the entry gives.
     airspeed
         m/s: where a coefficient is read.
+    path
+        Of the entry in the file; "factor.NAME" by default.
 
     Raises
     ------
     InputError
         Unknown target or distribution, wrong unit, a range that is reversed or has no width, a value that is not the vehicle's.
     """
-    path = f"factor.{table.name}"
+    path = path if path is not None else f"factor.{table.name}"
     table.require(path)
     target = table.target if table.target is not None else table.name
     if target not in TARGETS:
@@ -47,17 +116,15 @@ def factor_of(table: FactorTable, vehicle: Vehicle, airspeed: float) -> tuple[Fa
             f"{path}.value",
             f"is {value:.10g} {unit}, and the vehicle {vehicle.name!r} has {nominal:.10g} {unit}: change one of them",
         )
-    source = table.source if table.source is not None else f"assumed: {table.assumed}"
-    factor = Factor(table.name, _distribution(table, value, scale), target=target, unit=unit, source=source)
+    factor = Factor(table.name, _distribution(table, value, scale, path), target=target, unit=unit, source=in_words(table))
     return factor, target, nominal
 
 
-def _distribution(table: FactorTable, value: float, scale: float) -> Distribution:
-    path = f"factor.{table.name}"
+def _distribution(table: FactorTable, value: float, scale: float, path: str) -> Distribution:
     if table.distribution not in DISTRIBUTIONS:
         raise unknown_name(f"{path}.distribution", table.distribution, DISTRIBUTIONS)
     made = DISTRIBUTIONS[table.distribution]
-    _check_keys(table)
+    _check_keys(table, path)
     if table.range is not None and table.kind is not None:
         low, high = table.range if table.kind == "relative" else (scale * end for end in table.range)
         return uniform_around(value, low, high, table.kind, field=f"{path}.range")
@@ -67,7 +134,7 @@ def _distribution(table: FactorTable, value: float, scale: float) -> Distributio
         raise InputError(f"{path}.{error.field.rpartition('.')[2]}", error.problem) from None
 
 
-def _check_keys(table: FactorTable) -> None:
+def _check_keys(table: FactorTable, path: str) -> None:
     """Refuse a parameter that is missing or belongs to another distribution."""
     if table.distribution == "uniform":
         required, optional = ["range", "kind"], []
@@ -77,10 +144,10 @@ def _check_keys(table: FactorTable) -> None:
     takes = f"a {table.distribution} distribution takes {', '.join(required + optional)}"
     for name in table.parameters:
         if name not in required + optional:
-            raise InputError(f"factor.{table.name}.{name}", f"has no place here: {takes}")
+            raise InputError(f"{path}.{name}", f"has no place here: {takes}")
     for name in required:
         if name not in table.parameters:
-            raise InputError(f"factor.{table.name}.{name}", f"missing: {takes}")
+            raise InputError(f"{path}.{name}", f"missing: {takes}")
 
 
 def _converted(name: str, given: Any, scale: float) -> Any:

@@ -12,19 +12,32 @@ from typing import Any
 
 import numpy as np
 
-from levelone.config.factor_table import factor_of
-from levelone.config.files import file_hash, read_toml
+from levelone.config.deceleration_table import deceleration_of
+from levelone.config.extends import StudySource, read_study
+from levelone.config.factor_table import check_corners, inputs_of
 from levelone.config.manoeuvres import manoeuvre
-from levelone.config.schema import check, in_file
+from levelone.config.schema import in_section
 from levelone.config.study_schema import Condition, FrequencyGrid, Manoeuvres, MethodTable, StudyFile
-from levelone.config.vehicle_file import library, load_vehicle, vehicle_path
+from levelone.config.study_sections import (
+    Cases,
+    Coupling,
+    Deceleration,
+    Froude,
+    amplitudes_of,
+    assumed_of,
+    cases_of,
+    coupling_of,
+    findings_of,
+    froude_of,
+)
+from levelone.config.vehicle_file import load_vehicle, vehicle_path
 from levelone.errors import InputError
 from levelone.handling.history import FloatArray
 from levelone.handling.levels import Boundaries, load_boundaries
-from levelone.handling.manoeuvres import Manoeuvre
+from levelone.handling.manoeuvres import Manoeuvre, Start
 from levelone.uncertainty import FactorSpace
 from levelone.uncertainty.failures import Policy
-from levelone.vehicle import Controller, Vehicle, vary
+from levelone.vehicle import Controller, Vehicle
 
 
 @dataclass(frozen=True)
@@ -54,15 +67,15 @@ class Study:
     name, title, intended_use
         For the report; ``name`` is also the name of its folder of results.
     path, hash
-        The study file and its SHA-256.
+        The study file, and its SHA-256 (over all files of the chain where it extends another).
     vehicle, vehicle_path
         The nominal vehicle and its file.
     seed
         From which the seeds of all stages are derived.
     policy
         What failed runs do to indices: "refuse", "drop" or "bound".
-    trim_speed, flight_mode
-        m/s, level flight; mode of the controller.
+    trim_speed, flight_mode, start
+        m/s, level flight; mode of the controller; from which trim a varied vehicle begins.
     quickness, stability, sweep
         Manoeuvres: the step, the pulse, and the sweep that the linear response is compared with.
     windows
@@ -77,6 +90,14 @@ class Study:
         Level boundaries, where they come from (library name or path), and the bandwidth chart that sets the Level.
     not_validated, validity_domain, notes
         Statements that the report repeats.
+    findings
+        File of claims that results are compared with; None where there is none.
+    coupling, cases, froude, deceleration
+        What is done beside screening, Monte Carlo and decomposition; None or empty where it is not asked for.
+    amplitudes
+        m/s: sweeps that are compared with the linear response.
+    assumed
+        (path, why) of every value of the study file that is marked as assumed.
     """
 
     name: str
@@ -90,6 +111,7 @@ class Study:
     policy: Policy
     trim_speed: float
     flight_mode: str
+    start: Start
     quickness: Manoeuvre
     stability: Manoeuvre
     sweep: Manoeuvre
@@ -105,6 +127,13 @@ class Study:
     not_validated: tuple[str, ...]
     validity_domain: tuple[str, ...]
     notes: tuple[str, ...]
+    findings: Path | None
+    coupling: Coupling | None
+    cases: tuple[Cases, ...]
+    amplitudes: tuple[float, ...]
+    froude: Froude | None
+    deceleration: Deceleration | None
+    assumed: tuple[tuple[str, str], ...]
 
 
 def load_study(path: str | PathLike[str]) -> Study:
@@ -113,64 +142,69 @@ def load_study(path: str | PathLike[str]) -> Study:
     Parameters
     ----------
     path
-        TOML file; the format is described in docs/reference/study-file.md. A vehicle's or boundaries' path is relative to it.
+        TOML file; the format is described in docs/reference/study-file.md. Paths of a vehicle, of boundaries, of findings and of
+        a study that it extends are relative to it.
 
     Raises
     ------
     InputError
         One line with file, path of the value, what is wrong and what is allowed.
     """
-    path = Path(path)
-    content = check(StudyFile, read_toml(path), path.name)
-    with in_file(path.name):
-        where = _vehicle_path(content.study.vehicle, path)
+    source = read_study(Path(path))
+    content = source.checked()
+    with source.blamed(), in_section("study"):
+        where = vehicle_path(content.study.vehicle)
     vehicle = load_vehicle(where)
-    with in_file(path.name):
-        return _study(content, path, vehicle, where)
+    with source.blamed():
+        return _study(content, source, vehicle, where)
 
 
-def _study(content: StudyFile, path: Path, vehicle: Vehicle, where: Path) -> Study:
+def _study(content: StudyFile, source: StudySource, vehicle: Vehicle, where: Path) -> Study:
     general, condition = content.study, content.condition
     quickness, stability, swept = _manoeuvres(content.manoeuvre, condition, vehicle.controller)
-    space, targets, nominal = _factors(content, vehicle)
-    _check_corners(vehicle, space, targets, (quickness, stability, swept))
-    source = _boundaries_source(content.levels.boundaries, path)
-    boundaries = load_boundaries(source)
+    factors = [(f"factor.{table.name}", table) for table in content.factor]
+    inputs = inputs_of(factors, vehicle, condition.trim_speed)
+    paths = [path for path, _ in factors]
+    check_corners(inputs, paths, vehicle, (quickness, stability, swept))
+    boundaries_source = _boundaries_source(content.levels.boundaries)
+    boundaries = load_boundaries(boundaries_source)
     boundaries.chart("bandwidth", content.levels.task)
     return Study(
         name=general.name,
         title=general.title,
         intended_use=general.intended_use,
-        path=path,
-        hash=file_hash(path),
+        path=source.path,
+        hash=source.hash,
         vehicle=vehicle,
         vehicle_path=where,
         seed=general.seed,
         policy=general.failures,
         trim_speed=condition.trim_speed,
         flight_mode=condition.flight_mode,
+        start=condition.start,
         quickness=quickness,
         stability=stability,
         sweep=swept,
         windows=_windows(content.manoeuvre.bandwidth, swept),
         omega=_omega(content.manoeuvre.bandwidth, vehicle.controller),
-        space=space,
-        targets=targets,
-        nominal=nominal,
+        space=inputs.space,
+        targets=inputs.targets,
+        nominal=inputs.nominal,
         method=_method(content.method),
         boundaries=boundaries,
-        boundaries_source=source,
+        boundaries_source=boundaries_source,
         task=content.levels.task,
         not_validated=tuple(general.not_validated),
         validity_domain=tuple(general.validity_domain),
         notes=tuple(general.notes),
+        findings=findings_of(general.findings),
+        coupling=coupling_of(content.coupling, factors, vehicle, quickness),
+        cases=cases_of(content.cases, vehicle, condition.trim_speed),
+        amplitudes=amplitudes_of(content.manoeuvre.bandwidth.sweep.amplitudes),
+        froude=froude_of(content.levels.froude),
+        deceleration=deceleration_of(content.deceleration, inputs, paths, vehicle),
+        assumed=assumed_of(content),
     )
-
-
-def _vehicle_path(name: str, study: Path) -> Path:
-    if name in library() or not name.endswith(".toml"):
-        return vehicle_path(name)
-    return study.parent / name
 
 
 def _manoeuvres(given: Manoeuvres, condition: Condition, controller: Controller) -> tuple[Manoeuvre, Manoeuvre, Manoeuvre]:
@@ -225,35 +259,6 @@ def _method(given: MethodTable) -> Method:
     return Method(**given.model_dump())
 
 
-def _factors(content: StudyFile, vehicle: Vehicle) -> tuple[FactorSpace, tuple[str, ...], FloatArray]:
-    factors, targets, nominal = zip(
-        *(factor_of(table, vehicle, content.condition.trim_speed) for table in content.factor), strict=True
-    )
-    for target in targets:
-        if targets.count(target) > 1:
-            same = [factor.name for factor in factors if factor.target == target]
-            raise InputError(f"factor.{same[1]}", f"sets {target} as the factor {same[0]} does; each target may be set once")
-    space = FactorSpace(factors)
-    space.require_bounded("a Morris design")
-    values = np.array(nominal)
-    values.setflags(write=False)
-    return space, targets, values
-
-
-def _check_corners(vehicle: Vehicle, space: FactorSpace, targets: tuple[str, ...], manoeuvres: tuple[Manoeuvre, ...]) -> None:
-    """Refuse a box whose lowest or highest corner is no vehicle, or leaves what every run needs."""
-    from levelone.dynamics.simulate import check_before_flight
-
-    corners = space.transform(np.array([[0.0], [1.0]]) * np.ones(len(space)))
-    try:
-        batch = vary(vehicle, targets, corners, manoeuvres[0].trim_speed)
-    except InputError as error:
-        name = space.names[targets.index(error.field)] if error.field in targets else error.field
-        raise InputError(f"factor.{name}.range", error.problem) from None
-    for flown in manoeuvres:
-        check_before_flight(batch, flown)
-
-
-def _boundaries_source(name: str, study: Path) -> str:
+def _boundaries_source(name: str) -> str:
     """Name in the library, or path of the user's own file."""
-    return str((study.parent / name).resolve()) if name.endswith(".toml") else name
+    return str(Path(name).resolve()) if name.endswith(".toml") else name

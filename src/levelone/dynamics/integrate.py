@@ -165,7 +165,7 @@ def ticks(
         for c in range(len(command)):
             command[c] = commands[k, c]
         if piloted:
-            asked[k] = pilot_speed(pilot, sight, k, y[0], y[3], trim_speed, asked[k - 1] if k > 0 else trim_speed, period)
+            asked[k] = pilot_speed(pilot, sight, k, y[0], y[3], trim_speed)
             command[C_VLON] += asked[k] - trim_speed
         extremes[6] += control(law, mode, command, trim_speed, climb, seen, memory, throttle)
         for r in range(n):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from levelone.compiled import inlined
@@ -41,7 +42,7 @@ def pilot_numbers(pilot: Pilot | None, manoeuvre: Manoeuvre, period: float) -> H
 
 
 @inlined
-def pilot_speed(pilot, sight, k, north, speed, trim_speed, last, period):
+def pilot_speed(pilot, sight, k, north, speed, trim_speed):
     """Commanded forward ground speed at tick ``k``; ``sight`` [delay + 1, 2] keeps what has been seen (position, speed).
 
     Before the first delay is over nothing has been seen: the trim is held.
@@ -52,7 +53,7 @@ def pilot_speed(pilot, sight, k, north, speed, trim_speed, last, period):
     if k < max(pilot.delay, pilot.on):
         return trim_speed
     then = (k - pilot.delay) % depth
-    to_go, closing = pilot.distance - sight[then, 0], -sight[then, 1]
-    wanted = min(max(pilot.gain * (to_go + pilot.lead * closing), -pilot.reverse), trim_speed)
-    change = pilot.deceleration * period
-    return min(max(wanted, last - change), last + change)
+    judged = pilot.distance - sight[then, 0] - pilot.lead * sight[then, 1]
+    near = pilot.deceleration / (pilot.gain * pilot.gain)
+    wanted = pilot.gain * judged if judged < near else math.sqrt(2.0 * pilot.deceleration * (judged - 0.5 * near))
+    return min(max(wanted, -pilot.reverse), trim_speed)

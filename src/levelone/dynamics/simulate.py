@@ -19,10 +19,10 @@ from levelone.dynamics.controller import COMMANDS, MODES, Law, Laws
 from levelone.dynamics.integrate import BUFFER, CHANNELS, EXTREMES, fly
 from levelone.dynamics.model import Plant, plants_of
 from levelone.dynamics.pilot import pilot_numbers
-from levelone.dynamics.trim import laws_of, run_trim
+from levelone.dynamics.trim import design_trim, laws_of, run_trim
 from levelone.errors import InputError, unknown_name
 from levelone.handling.history import TimeHistory
-from levelone.handling.manoeuvres import Manoeuvre
+from levelone.handling.manoeuvres import Manoeuvre, Start
 from levelone.handling.pilot import Pilot
 from levelone.status import Status
 from levelone.vehicle import Sensors, Vehicle, VehicleBatch, batch_of
@@ -147,6 +147,7 @@ def simulate(
     channels: Sequence[str] | None = None,
     gust: FloatArray | None = None,
     pilot: Pilot | None = None,
+    start: Start = "own trim",
     threads: int | None = None,
     chunk: int = CHUNK,
 ) -> TimeHistory:
@@ -165,6 +166,10 @@ def simulate(
     pilot
         Decelerates to a point ahead from the manoeuvre's ``on``; the manoeuvre holds its trim otherwise (shape "none", velocity
         mode, no steady wind needed). ``V_lon_ref`` of the record is then what the pilot commanded, [run, time].
+    start
+        "own trim": each vehicle begins in the trim that its own numbers give. "design trim": all begin as the vehicle for which
+        the controller was designed would, as where trims come out of a table made beforehand; others then drift until the
+        controller has found their trim.
     threads, chunk
         How the batch is worked off; no influence on the results.
 
@@ -198,17 +203,20 @@ def simulate(
     sensors = sensor_arrays(batch.nominal.sensors, batch.nominal.controller.period)
     condition = (float(manoeuvre.trim_speed), float(manoeuvre.trim_climb), float(manoeuvre.dt))
     given = (sensors, MODES.index(manoeuvre.flight_mode), command_table(manoeuvre), wind, hand)
-    start = run_trim(batch, laws, np.full(n, condition[0]), condition[1], here)
+    if start == "own trim":
+        begin = run_trim(batch, laws, np.full(n, condition[0]), condition[1], here)
+    else:
+        begin = design_trim(batch, laws, condition[0], condition[1], here)
     *differing, shared = plants_of(batch)
 
     def work(part: slice) -> None:
         plants = (*(array[part] for array in differing), shared)
-        starts = (start.state[part], start.memory[part], start.throttle[part])
-        flown = (records[part], asked[part], extremes[part], start.status[part])
+        starts = (begin.state[part], begin.memory[part], begin.throttle[part])
+        flown = (records[part], asked[part], extremes[part], begin.status[part])
         fly_chunk(plants, select_laws(laws, part), *given, starts, *condition, rows, *flown)
 
     run_chunks(work, n, threads_of(threads), chunk)
-    history = _history(batch, manoeuvre, wanted, records, extremes, start.status)
+    history = _history(batch, manoeuvre, wanted, records, extremes, begin.status)
     return history if pilot is None else replace(history, channels={**history.channels, "V_lon_ref": asked})
 
 

@@ -7,7 +7,7 @@ sideways ground speed zero. Residuals are forces over weight and moments over we
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,7 +145,8 @@ def rotor_at_rest(plant: Plant) -> FloatArray:
 
 def stacked(laws: Sequence[Law], which: NDArray[np.int64]) -> Laws:
     """Controllers side by side, and which of them flies each run."""
-    return Laws(*(np.stack(part) for part in zip(*laws, strict=True)), which)
+    gains, pid, alloc, table = (np.stack(part) for part in zip(*laws, strict=True))
+    return Laws(gains, pid, alloc, table, which)
 
 
 def laws_of(batch: VehicleBatch) -> Laws:
@@ -196,6 +197,13 @@ def run_trim(
     throttle, status = np.empty((n, batch.nominal.n_rotors)), np.empty(n, np.int64)
     trim_chunk(plants_of(batch), laws, speeds, float(climb), wind, unknowns, residual, state, memory, throttle, status)
     return Trim(state, unknowns[:, :2], unknowns[:, 2:], throttle, residual, status, memory)
+
+
+def design_trim(batch: VehicleBatch, laws: Laws, speed: float, climb: float, wind: tuple[float, float, float]) -> Trim:
+    """For each airframe of a batch, the trim of the vehicle that its controller was designed for."""
+    designs = batch_of([replace(batch.nominal, airframe=each.design, controller=each) for each in batch.controllers])
+    found = run_trim(designs, laws._replace(which=designs.which), np.full(len(designs), speed), climb, wind)
+    return Trim(*(getattr(found, field.name)[batch.which] for field in fields(Trim)))
 
 
 def trim(

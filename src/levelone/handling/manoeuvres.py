@@ -15,6 +15,8 @@ from levelone.handling.history import FloatArray
 FlightMode = Literal["rate", "attitude", "velocity", "position"]
 Axis = Literal["V_lon", "V_lat", "V_vert", "yaw_rate", "theta", "phi", "q", "p"]
 Shape = Literal["step", "pulse", "sweep", "none"]
+Start = Literal["own trim", "design trim"]
+"""From which trim a vehicle begins: its own, or that of the vehicle for which its controller was designed."""
 
 UNITS = {
     "V_lon": "m/s",

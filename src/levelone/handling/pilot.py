@@ -1,7 +1,9 @@
 """A pilot who captures a position: what is seen, how late, and what is asked of the inceptor.
 
 The crossover model's gain, lead and effective delay (McRuer and Krendel, Mathematical Models of Human Pilot Behavior, AGARDograph
-188, 1974, ch. II), closed on the distance to go of an aircraft whose inceptor commands ground speed.
+188, 1974, ch. II), closed on the distance to go of an aircraft whose inceptor commands ground speed. Far out the pilot keeps to a
+constant deceleration, the case tau-dot = 1/2 of Padfield, Lee and Bradley, How Do Helicopter Pilots Know When to Stop, Turn or Pull
+Up?, Journal of the American Helicopter Society 48 (2), 2003.
 """
 
 from __future__ import annotations
@@ -16,8 +18,9 @@ from levelone.errors import InputError
 class Pilot:
     """Deceleration to a point ahead.
 
-    With e the distance to go seen ``delay`` seconds ago, the commanded forward ground speed is
-    gain * (e + lead * de/dt), kept between ``-reverse`` and the trim speed, and changes no faster than ``deceleration``.
+    With e the distance to go seen ``delay`` seconds ago and s = e + lead * de/dt, the commanded forward ground speed is gain * s
+    near the point, and sqrt(2 a (s - a / (2 gain^2))) beyond s = a / gain^2, where both and their slopes agree; a is
+    ``deceleration``. It is kept between ``-reverse`` and the trim speed.
 
     Parameters
     ----------
@@ -28,7 +31,7 @@ class Pilot:
     delay
         s: effective delay of eye, mind and hand; rounded to whole control periods.
     deceleration
-        m/s^2: fastest change of the commanded speed, either way.
+        m/s^2: what the pilot plans for.
     reverse
         m/s: largest rearward speed that is commanded.
     distance

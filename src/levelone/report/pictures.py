@@ -40,14 +40,14 @@ def pictures(results: Results, charts: Charts) -> list[Picture]:
         Picture("plane_attitude_quickness", "attitude_quickness",
                 "Monte Carlo runs on the plane of the requirement. Below its range the boundaries are extended and count apart.",
                 False, partial(draw_quickness_plane, results, charts.attitude_quickness)),
-        *_sensitivity(results, "attitude_quickness"),
+        *sensitivity(results, "attitude_quickness"),
         Picture("history_dynamic_stability", "dynamic_stability",
                 "Pulse in longitudinal speed: the free response begins after the pulse and all delays (end of the grey band).",
                 False, partial(draw_stability, histories["dynamic_stability"])),
         Picture("plane_dynamic_stability", "dynamic_stability",
                 "Monte Carlo runs as poles of the mode, with the limits on damping.",
                 False, partial(draw_stability_plane, results, charts.dynamic_stability)),
-        *_sensitivity(results, "dynamic_stability"),
+        *sensitivity(results, "dynamic_stability"),
         Picture("history_bandwidth", "bandwidth", "Frequency sweep of the nonlinear model.",
                 True, partial(draw_sweep, histories["bandwidth"])),
         Picture("bode", "bandwidth",
@@ -58,11 +58,11 @@ def pictures(results: Results, charts: Charts) -> list[Picture]:
                 "Monte Carlo runs in phase delay and bandwidth. Only the reading on attitude has a Level; the regions behind the "
                 "other are there for comparison.",
                 True, partial(draw_bandwidth_plane, results, charts.bandwidth)),
-        *_sensitivity(results, "bandwidth"),
+        *sensitivity(results, "bandwidth"),
     ]  # fmt: skip
 
 
-def _sensitivity(results: Results, criterion: str) -> list[Picture]:
+def sensitivity(results: Results, criterion: str) -> list[Picture]:
     """Screening of each response of a criterion, and their Sobol indices together."""
     entries = results.of(criterion)
     if not entries:

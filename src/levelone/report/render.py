@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, UndefinedError
-from markupsafe import Markup
+from jinja2 import UndefinedError
 
 from levelone.errors import InputError
-from levelone.report import assumptions, style, svg, symbols, tables
+from levelone.report import assumptions, symbols, tables
 from levelone.report.charts import Charts, charts_of
-from levelone.report.formatting import number, percent
+from levelone.report.page import Progress, environment, files_of, quiet, write_figures
 from levelone.report.pictures import Picture, pictures
 from levelone.report.results import CRITERIA, Results, load_results
+from levelone.report.sections import contexts, further_pictures
+from levelone.report.translation import nominal_levels
 
-Progress = Callable[[str, int, int], None]
-"""Called with the stage's name, the steps done and the steps in all."""
 
-
-def render_report(directory: str | PathLike[str], progress: Progress | None = None) -> Path:
+def render_report(directory: str | PathLike[str], progress: Progress = quiet, workers: int = 1) -> Path:
     """Draw all figures of a finished study into ``figures/`` and write ``report.html``; return its path.
 
     The same results give the same bytes. Nothing is written unless the folder can be read as a whole.
@@ -31,7 +31,9 @@ def render_report(directory: str | PathLike[str], progress: Progress | None = No
     directory
         Folder that the study wrote.
     progress
-        Called after each figure drawn and each file written, with ``"report"``, steps done and steps in all.
+        Called after each figure drawn and each file made, with ``"report"``, steps done and steps in all; not with several workers.
+    workers
+        Processes that draw, on Linux; no influence on the results.
 
     Raises
     ------
@@ -42,10 +44,11 @@ def render_report(directory: str | PathLike[str], progress: Progress | None = No
     try:
         charts = charts_of(results.summary["study"])
         context = _context(results, charts)
-        plans = pictures(results, charts)
-        with style.paper():
-            drawings = _write(results.directory / "figures", plans, progress or (lambda stage, done, total: None))
-        page = _environment().get_template("report.html").render(**context, drawings=drawings)
+        plans = _plans(results)
+        alone = workers == 1 or sys.platform != "linux"
+        files = files_of(plans, progress) if alone else _files_by(workers, results.directory, len(plans))
+        drawings = _by_section(write_figures(results.directory / "figures", plans, files))
+        page = environment().get_template("report.html").render(**context, drawings=drawings)
     except (KeyError, UndefinedError) as error:
         raise InputError(str(results.directory), f"the results miss {error}; run the study again") from error
     path = results.directory / "report.html"
@@ -56,44 +59,37 @@ def render_report(directory: str | PathLike[str], progress: Progress | None = No
     return path
 
 
-def _write(folder: Path, plans: list[Picture], progress: Progress) -> dict[str, list[dict[str, Any]]]:
-    """Draw and save; the pictures of each criterion with number, caption and inline SVG."""
-    total, done = 3 * len(plans), 0
-
-    def each(items: Iterable[Any], work: Callable[[Any], Any]) -> list[Any]:
-        nonlocal done
-        results = []
-        for item in items:
-            results.append(work(item))
-            done += 1
-            progress("report", done, total)
-        return results
-
-    figures = each(plans, lambda plan: plan.draw())
-    try:
-        folder.mkdir(exist_ok=True)
-        pairs = list(zip(plans, figures, strict=True))
-        each(pairs, lambda pair: style.save_png(pair[1], folder / f"{pair[0].name}.png"))
-        each(pairs, lambda pair: style.save_svg(pair[1], folder / f"{pair[0].name}.svg"))
-    except OSError as error:
-        raise InputError(str(folder), f"cannot be written: {error.strerror}") from error
-    return _numbered(folder, plans)
+def _plans(results: Results) -> list[Picture]:
+    """Every picture of the report, in its order."""
+    return [*pictures(results, charts_of(results.summary["study"])), *further_pictures(results)]
 
 
-def _numbered(folder: Path, plans: list[Picture]) -> dict[str, list[dict[str, Any]]]:
-    drawings: dict[str, list[dict[str, Any]]] = {criterion: [] for criterion in CRITERIA}
-    for count, plan in enumerate(plans, start=1):
-        text = (folder / f"{plan.name}.svg").read_text(encoding="utf-8")
-        drawings[plan.criterion].append({
-            "number": count, "name": plan.name, "caption": plan.caption, "wide": plan.wide,
-            "svg": Markup(svg.inline(text, plan.name)),  # drawn here: text in it is outlines
-        })  # fmt: skip
-    return drawings
+def _files_by(workers: int, directory: Path, count: int) -> list[tuple[bytes, bytes]]:
+    """Draw in several processes: each takes every so many pictures.
+
+    They are forked: started anew, each would load the libraries and read every symbol again, which costs what it saves.
+    """
+    with ProcessPoolExecutor(workers, mp_context=get_context("fork")) as pool:
+        parts = list(pool.map(_part, [directory] * workers, range(workers), [workers] * workers))
+    return [parts[i % workers][i // workers] for i in range(count)]
+
+
+def _part(directory: Path, first: int, step: int) -> list[tuple[bytes, bytes]]:
+    return files_of(_plans(load_results(directory))[first::step])
+
+
+def _by_section(drawings: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
+    """Pictures of each criterion and of each further section."""
+    out: dict[str, list[dict[str, Any]]] = {criterion: [] for criterion in CRITERIA}
+    for drawing in drawings:
+        out.setdefault(drawing["section"], []).append(drawing)
+    return out
 
 
 def _context(results: Results, charts: Charts) -> dict[str, Any]:
     """Everything that the template shows, apart from the pictures."""
     summary = results.summary
+    levels = tables.nominal_levels(results, charts) | nominal_levels(results)
     varied, fixed = assumptions.ranked(summary)
     titles, validity = tables.validity_rows(summary["validity"])
     return {
@@ -102,7 +98,7 @@ def _context(results: Results, charts: Charts) -> dict[str, Any]:
         "summary": summary,
         "varied": varied,
         "fixed": fixed,
-        "rows": tables.summary_rows(results, tables.nominal_levels(results, charts)),
+        "rows": tables.summary_rows(results, levels),
         "levels": tables.level_rows(summary["levels"]),
         "indices": {
             criterion: [(symbols.title(name), symbols.html(name), symbols.field_unit(entry["unit"])[1], tables.index_rows(entry))
@@ -115,13 +111,6 @@ def _context(results: Results, charts: Charts) -> dict[str, Any]:
         "numerics": tables.numerics_rows(results),
         "nominal": tables.nominal_rows(summary["nominal"]),
         "boundaries": charts,
+        **contexts(results),
         "criteria": {criterion: symbols.CRITERION_TITLES[criterion] for criterion in CRITERIA},
     }  # fmt: skip
-
-
-def _environment() -> Environment:
-    environment = Environment(
-        loader=PackageLoader("levelone.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters.update(number=number, percent=percent, symbol=symbols.html)
-    return environment

@@ -75,14 +75,14 @@ def load_results(directory: str | PathLike[str]) -> Results:
     """
     folder = Path(directory)
     summary = _summary(folder)
-    groups = {name: _dataset(folder / "histories.nc", name) for name in CRITERIA}
+    groups = {name: read_group(folder / "histories.nc", name) for name in CRITERIA}
     return Results(
         directory=folder,
         summary=summary,
-        monte_carlo=_dataset(folder / "monte_carlo.nc"),
+        monte_carlo=read_group(folder / "monte_carlo.nc"),
         histories=groups,
-        linear=_dataset(folder / "frequency.nc", "linear"),
-        swept=_dataset(folder / "frequency.nc", "swept"),
+        linear=read_group(folder / "frequency.nc", "linear"),
+        swept=read_group(folder / "frequency.nc", "swept"),
     )
 
 
@@ -114,7 +114,14 @@ def _summary(folder: Path) -> dict[str, Any]:
     return summary
 
 
-def _dataset(path: Path, group: str | None = None) -> xr.Dataset:
+def read_group(path: Path, group: str | None = None) -> xr.Dataset:
+    """One group of a NetCDF file, or the whole file.
+
+    Raises
+    ------
+    InputError
+        The file or the group is missing, or cannot be read.
+    """
     what = str(path) if group is None else f"{path}: group {group}"
     try:
         with xr.open_dataset(path, group=group, engine="h5netcdf") as data:

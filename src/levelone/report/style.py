@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
+from io import BytesIO
 from typing import Any, Literal
 
 import matplotlib as mpl
@@ -138,18 +138,22 @@ def _canvas(figure: Figure) -> FigureCanvasAgg:
     return canvas
 
 
-def save_png(figure: Figure, path: Path) -> None:
-    """Write a picture of dots, without date or version.
+def png_of(figure: Figure) -> bytes:
+    """A picture of dots, without date or version.
 
     The canvas is asked itself: ``Figure.savefig`` draws everything twice.
     """
     figure.set_dpi(PNG_DPI)  # print_svg leaves its own
-    _canvas(figure).print_png(path, metadata={"Software": None})
+    out = BytesIO()
+    _canvas(figure).print_png(out, metadata={"Software": None})
+    return out.getvalue()
 
 
-def save_svg(figure: Figure, path: Path) -> None:
-    """Write a picture of lines, without date or version. Symbols are kept between calls: write SVG after SVG."""
-    FigureCanvasSVG(figure).print_svg(path, metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+def svg_of(figure: Figure) -> bytes:
+    """A picture of lines, without date or version. Symbols are kept between calls: write SVG after SVG."""
+    out = BytesIO()
+    FigureCanvasSVG(figure).print_svg(out, metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    return out.getvalue()
 
 
 def grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:

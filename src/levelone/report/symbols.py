@@ -26,6 +26,11 @@ _SPECIAL = {
     "omega_bw_gain_attitude": (r"\omega_{\mathrm{BW,gain}}", "<i>ω</i><sub>BW,gain</sub>"),
     "omega_bw_phase": (r"\omega_{\mathrm{BW,phase}}", "<i>ω</i><sub>BW,phase</sub>"),
     "tau_p_attitude": (r"\tau_p", "<i>τ</i><sub>p</sub>"),
+    "omega_bw_swept": (r"\omega_{\mathrm{BW}}", "<i>ω</i><sub>BW</sub>"),
+    "tau_p_swept": (r"\tau_p", "<i>τ</i><sub>p</sub>"),
+    "rise_time": (r"T_{\mathrm{eq}}", "<i>T</i><sub>eq</sub>"),
+    "overshoot": (r"\Delta V_{\mathrm{os}}/\Delta V", "Δ<i>V</i><sub>os</sub>/Δ<i>V</i>"),
+    "ratio": (r"\Delta\phi_{\mathrm{pk}}/\Delta\theta_{\mathrm{pk}}", "Δ<i>φ</i><sub>pk</sub>/Δ<i>θ</i><sub>pk</sub>"),
 }
 
 _TITLES = {
@@ -38,12 +43,19 @@ _TITLES = {
     "tau_p": "Phase delay of q / V_lon",
     "omega_bw_attitude": "Bandwidth of −θ / V_lon",
     "tau_p_attitude": "Phase delay of −θ / V_lon",
+    "omega_bw_swept": "Bandwidth of q / V_lon, swept",
+    "tau_p_swept": "Phase delay of q / V_lon, swept",
+    "rise_time": "Rise time of the ground speed",
+    "overshoot": "Overshoot of the ground speed",
+    "ratio": "Roll for pitch",
 }
 
 CRITERION_TITLES = {
     "attitude_quickness": "Attitude quickness",
     "dynamic_stability": "Dynamic stability",
     "bandwidth": "Bandwidth and phase delay",
+    "translational_rate": "Translational rate response",
+    "pitch_roll_coupling": "Pitch-roll coupling",
     "worst": "Worst of the three",
 }
 

@@ -19,7 +19,7 @@ LEVEL_WORDS = {
     Level.LEVEL_2: "Level 2",
     Level.LEVEL_3: "Level 3",
 }
-NO_LEVEL = ("omega_bw", "tau_p", "delta_theta_pk")
+NO_LEVEL = ("omega_bw", "tau_p", "delta_theta_pk", "overshoot")
 """Responses beside those that the requirement reads."""
 
 _VALIDITY = (
@@ -79,7 +79,8 @@ def _quality(q2: float) -> str:
 def level_rows(levels: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Shares of Levels for each criterion and for the worst of them."""
     rows = []
-    for criterion in (*CRITERIA, "worst"):
+    further = ["translational_rate"] if "translational_rate" in levels else []
+    for criterion in (*CRITERIA, "worst", *further):
         entry = levels[criterion]
         extended = entry.get("extrapolated")
         rows.append({
