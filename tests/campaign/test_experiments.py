@@ -12,7 +12,7 @@ import pytest
 from claim_cases import spread
 from claim_examples import evidence
 
-from levelone.campaign import experiments
+from levelone.campaign import build_model, experiments
 from levelone.campaign.claims import Evidence
 from levelone.campaign.claims.evidence import load_evidence
 from levelone.campaign.claims.judge import judge
@@ -164,6 +164,15 @@ def test_progress_counts_vehicles(tmp_path: Path, flights: Flights) -> None:
 def test_faults_of_the_file_are_named(tmp_path: Path, parts: tuple[str, ...], said: str) -> None:
     with pytest.raises(InputError, match=said):
         load_experiments(write(tmp_path, *parts))
+
+
+def test_an_experiment_may_change_where_runs_begin(tmp_path: Path) -> None:
+    begin = '[[experiment]]\nname = "begin"\nquestion = "?"\nchanges = { "condition.start" = "design trim" }\n'
+    plan = load_experiments(write(tmp_path, begin))
+    assert (plan.study.start, plan.experiments[0].study.start) == ("own trim", "design trim")
+    assert build_model(plan.experiments[0].study).start == "design trim"
+    with pytest.raises(InputError, match=r"condition\.start: unknown name 'design trm'; did you mean 'design trim'"):
+        load_experiments(write(tmp_path, begin.replace("design trim", "design trm")))
 
 
 def test_a_study_without_findings_has_nothing_to_decide(tmp_path: Path) -> None:

@@ -189,3 +189,17 @@ def test_a_gust_of_the_wrong_shape_is_refused() -> None:
     bad[7, 1] = np.nan
     with pytest.raises(InputError, match="gust"):
         simulate(CRAFT, STEP, gust=bad)
+
+
+def test_from_the_design_trim_only_the_design_itself_stands_still() -> None:
+    """Light, nominal and heavy: all begin in the nominal attitude; what differs from the design rises or sinks at once."""
+    hold = Manoeuvre("hold", "velocity", "V_lon", 5.0, shape="none", duration=3.0)
+    batch = vary(CRAFT, ["M"], np.array([[6.5], [7.0], [7.5]]), 5.0)
+    own, design = simulate(batch, hold), simulate(batch, hold, start="design trim")
+    assert np.array_equal(design.channels["altitude"][1], own.channels["altitude"][1])
+    assert np.ptp(design.channels["theta"][:, 0]) == 0.0
+    assert np.ptp(own.channels["theta"][:, 0]) > 1e-4
+    light, heavy = design.channels["V_vert"][0, 25], design.channels["V_vert"][2, 25]  # 0.1 s of the weight's excess
+    assert light == pytest.approx(0.1 * 9.80665 * 0.5 / 6.5, rel=0.2)
+    assert heavy == pytest.approx(-0.1 * 9.80665 * 0.5 / 7.5, rel=0.2)
+    assert np.abs(own.channels["V_vert"]).max() < 1e-6

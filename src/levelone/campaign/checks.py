@@ -56,7 +56,7 @@ def validity(vehicle: Vehicle, assessed: Assessment) -> dict[str, Any]:
     everything = {
         key: np.concatenate([x[key] for x in assessed.extremes.values()]) for key in ("alpha_min", "alpha_max", "C_D_min")
     }
-    return _reach(everything) | _counts(either) | {name: _reach(assessed.extremes[name]) | _counts(m) for name, m in marks.items()}
+    return reach(everything) | _counts(either) | {name: reach(assessed.extremes[name]) | _counts(m) for name, m in marks.items()}
 
 
 def _marks(vehicle: Vehicle, x: Mapping[str, FloatArray]) -> dict[str, NDArray[np.bool_]]:
@@ -74,7 +74,7 @@ def _counts(marks: Mapping[str, NDArray[np.bool_]]) -> dict[str, int]:
     return {key: int(mark.sum()) for key, mark in marks.items()} | {"n": len(next(iter(marks.values())))}
 
 
-def _reach(x: Mapping[str, FloatArray]) -> dict[str, float]:
+def reach(x: Mapping[str, FloatArray]) -> dict[str, float]:
     """Extremes over the runs that flew; NaN where none did."""
 
     def of(pick: Callable[..., Any], values: FloatArray) -> float:

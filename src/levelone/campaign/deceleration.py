@@ -11,6 +11,7 @@ import xarray as xr
 
 from levelone.campaign import analysis
 from levelone.campaign.analysis import LEVEL_KEYS, Json
+from levelone.campaign.checks import reach
 from levelone.campaign.deceleration_flights import PERFORMANCE_KEYS, Flights, assess, history_group, measured_dataset
 from levelone.campaign.models import Assessment, BuiltinModel, IntArray
 from levelone.config.study_file import Study
@@ -19,7 +20,6 @@ from levelone.errors import InputError
 from levelone.handling.capture import MEASURES, SLOW, Performance, Tolerances
 from levelone.status import Status
 from levelone.uncertainty import Design, Responses, rank_agreement, shares, sobol_design, stage_seed
-from levelone.vehicle.tables import FloatArray
 
 #: measures whose variance is shared out among the factors
 DECOMPOSED = ("time", "overshoot", "theta", "height")
@@ -205,19 +205,7 @@ def _crossed(levels: IntArray, performance: IntArray) -> dict[str, dict[str, int
 
 
 def _reach(flown: Flights) -> dict[str, float]:
-    """Extremes over the runs that flew."""
-    x = flown.extremes
-
-    def of(pick: Callable[..., Any], values: FloatArray) -> float:
-        finite = values[np.isfinite(values)]
-        return float(pick(finite)) if finite.size else float("nan")
-
-    return {
-        "alpha_min_deg": float(np.degrees(of(np.min, x["alpha_min"]))),
-        "alpha_max_deg": float(np.degrees(of(np.max, x["alpha_max"]))),
-        "C_D_min": of(np.min, x["C_D_min"]),
-        "saturated_runs": int((x["saturated"] > 0).sum()),
-    }
+    return reach(flown.extremes) | {"saturated_runs": int((flown.extremes["saturated"] > 0).sum())}
 
 
 def _setting(study: Study, given: Deceleration) -> dict[str, Any]:

@@ -152,7 +152,7 @@ def _stability_plane(limits: DampingLimits) -> Plane:
     return Plane(
         lambda values, suffix: regions.pole(np.array(values["omega_n"]), np.array(values["zeta"])),
         lambda panel: regions.shade_damping(panel, limits),
-        (r"$-\zeta\,\omega_n$, rad/s", r"$\omega_n\sqrt{1-\zeta^2}$, rad/s"),
+        (r"$-\zeta\,\omega_n$, rad/s", r"damped frequency $\omega_d$, rad/s"),
         np.array([[-1.0, 0.0], [1.0, 1.0]]),
         lambda panel, clouds: name_sectors(panel, limits, clouds),
         (limits.confidence_zeta_1 == "high", limits.verified),

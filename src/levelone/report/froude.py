@@ -109,7 +109,7 @@ def _stability(panel: Axes, results: Results, scaled: Boundaries) -> None:
     panel.set(xlim=(1.3 * float(np.nanmin(both[:, 0])), 1.3 * float(np.nanmax(both[:, 0]))))
     panel.set_ylim(0.0, 1.2 * float(np.nanmax(both[:, 1])))
     panel.set_xlabel(r"$-\zeta\,\omega_n$, rad/s")
-    panel.set_ylabel(r"$\omega_n\sqrt{1-\zeta^2}$, rad/s")
+    panel.set_ylabel(r"damped frequency $\omega_d$, rad/s")
     regions.shade_damping(panel, scaled.dynamic_stability)
     _draw_runs(panel, cloud)
     name_sectors(panel, scaled.dynamic_stability, [cloud])

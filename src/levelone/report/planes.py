@@ -66,7 +66,7 @@ def draw_stability_plane(results: Results, limits: DampingLimits) -> Figure:
     left, right = float(np.nanmin(both[:, 0])), float(np.nanmax(both[:, 0]))
     panel.set(xlim=(1.35 * left, 1.35 * right), ylim=(0.0, 1.3 * float(np.nanmax(both[:, 1]))))
     panel.set_xlabel(r"$-\zeta\,\omega_n$, rad/s")
-    panel.set_ylabel(r"$\omega_n\sqrt{1-\zeta^2}$, rad/s")
+    panel.set_ylabel(r"damped frequency $\omega_d$, rad/s")
     regions.shade_damping(panel, limits)
     _cloud(panel, cloud, point)
     span = panel.get_xlim()[1] - panel.get_xlim()[0]
