@@ -11,7 +11,6 @@ from levelone._version import __version__
 from levelone.console import (
     Commands,
     announce_compilation,
-    available,
     csv_draft,
     numbers,
     say,
@@ -76,6 +75,7 @@ def run(
     from levelone.campaign.compare import compare as decide
     from levelone.campaign.compare import in_one_line
     from levelone.campaign.store import prepare_folder
+    from levelone.dynamics.simulate import threads_of
     from levelone.report import render_report
 
     folder = prepare_folder(out if out is not None else Path("results") / checked.name)
@@ -83,7 +83,7 @@ def run(
     with stage_bars() as progress:
         results = run_study(checked, folder, seed=seed, threads=threads, progress=progress)
     verdicts = in_one_line(decide(folder)) if checked.findings is not None else ""
-    page = render_report(folder, workers=min(threads or available(), 4))
+    page = render_report(folder, workers=min(threads_of(threads), 4))
     say(f"results: {results}")
     if checked.findings is not None:
         say(f"findings: {verdicts}")
@@ -144,9 +144,10 @@ def calibrate(
 @app.command()
 def report(directory: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that a run has filled.")]) -> None:
     """Write the report of a finished study anew."""
+    from levelone.dynamics.simulate import threads_of
     from levelone.report import render_report
 
-    say(f"report: {render_report(directory, workers=min(available(), 4))}")
+    say(f"report: {render_report(directory, workers=min(threads_of(None), 4))}")
 
 
 @app.command()

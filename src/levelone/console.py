@@ -43,11 +43,6 @@ def say(text: str) -> None:
     typer.echo(text, err=True)
 
 
-def available() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def numbers(text: str, field: str) -> list[float]:
     """``"0,5,10"``, or ``"FIRST:LAST:COUNT"`` in equal steps.
 

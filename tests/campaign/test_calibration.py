@@ -202,7 +202,6 @@ def test_a_trade_off_is_a_fit_for_each_point_of_each_curve(reference: Calibratio
     solution = np.array([each.prior * 1.1 for each in reference.parameters])
     cases = cases_of(reference, solution)
     tradeoff = reference.tradeoff
-    assert tradeoff is not None
     assert [case.asked for case in cases] == [*tradeoff.values] * 2
     assert [case.curve for case in cases] == [ORDINARY] * len(tradeoff.values) + ["strong rate derivative"] * len(tradeoff.values)
     changed = [each.path in ("controller.pitch_rate.Kd", "controller.pitch_rate.Kp") for each in reference.parameters]
@@ -256,7 +255,6 @@ def small(reference: Calibration) -> Calibration:
     keep = ("controller.pitch", "controller.command_lag", "rotors.position.x")
     targets = [each for each in reference.targets if each.response in ("omega_n", "quickness")]
     study = replace(reference.study, method=replace(reference.study.method, samples=20))
-    assert reference.tradeoff is not None
     return replace(
         reference,
         study=study,

@@ -99,7 +99,6 @@ def test_nothing_is_run_twice(tmp_path: Path, flights: Flights) -> None:
     run_experiments(write(tmp_path, LAG.replace("0.03", "0.04"), LAG.replace('"lag"', '"more"').replace("0.03", "0.05")))
     assert flights.lags[3:] == [0.04, 0.05]
     record = read_record(tmp_path / "experiments.json")
-    assert record is not None
     assert [trial.name for trial in record.experiments] == ["lag", "more"]
     # another seed: everything anew
     run_experiments(path, seed=1)
@@ -117,14 +116,12 @@ def test_an_interrupted_run_goes_on_where_it_stopped(tmp_path: Path, flights: Fl
     with pytest.raises(KeyboardInterrupt):
         run_experiments(path)
     part = read_record(tmp_path / "experiments.json")
-    assert part is not None
     assert [trial.name for trial in part.experiments] == ["lag"]
     assert part.explanations == []  # waits for its experiment
     monkeypatch.setattr(experiments, "evaluate", flights)
     run_experiments(path)
     assert flights.lags == [0.0, 0.03, 0.0]
     whole = read_record(tmp_path / "experiments.json")
-    assert whole is not None
     assert [trial.name for trial in whole.experiments] == ["lag", "gain"]
     assert len(whole.explanations) == 1
 
@@ -133,7 +130,6 @@ def test_calibrations_are_tried_too(tmp_path: Path, flights: Flights) -> None:
     entries = [{"name": "start 1", "changes": {"controller.pitch": 7.0, "rotors.motor_lag": 0.01}, "cost": 0.1}]
     (tmp_path / "calibration.json").write_text(json.dumps(entries))
     record = read_record(run_experiments(write(tmp_path, LAG, head=HEAD + 'calibrations = "calibration.json"\n')))
-    assert record is not None
     assert [(trial.name, trial.kind) for trial in record.experiments] == [("lag", "cause"), ("start 1", "calibration")]
 
 

@@ -166,7 +166,6 @@ def section(results: Results, name: str) -> Walk:
     """One section as the page has it, without pictures."""
     module, key = SECTIONS[name]
     environment = page.environment()
-    assert environment.loader is not None
     source = environment.loader.get_source(environment, "report.html")[0]
     macro = re.search(r"\{% macro table.*?endmacro %\}", source, re.DOTALL)
     assert macro

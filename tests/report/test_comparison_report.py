@@ -72,9 +72,7 @@ def tried(compared: Results, tmp_path: Path) -> Results:
 
 
 def shown(results: Results) -> dict[str, Any]:
-    found = comparison.context(results)
-    assert found is not None
-    return found
+    return comparison.context(results)
 
 
 def test_nothing_is_shown_without_findings(results: Results) -> None:
@@ -155,7 +153,6 @@ def test_labels_of_many_experiments_do_not_touch(tried: Results) -> None:
 def section(results: Results) -> str:
     """The section as the page has it, with a text in place of the picture."""
     made = environment()
-    assert made.loader is not None
     source = made.loader.get_source(made, "report.html")[0]
     macro = re.search(r"\{% macro table.*?endmacro %\}", source, re.DOTALL)
     assert macro

@@ -22,8 +22,6 @@ from levelone.vehicle.tables import FloatArray
 PITCH = ("quickness", "delta_theta_min", "zeta", "omega_n", "omega_bw", "tau_p")
 #: part of the largest mu_star below which a factor counts as without influence
 DROPPED = 0.01
-#: ratio of roll to pitch below which roll is rounding, not motion: it counts as 0
-ROUNDING = 1e-9
 NO_PATH = (
     "no coupling path in this model: vehicle and inputs are symmetric, a pitch command moves nothing in roll in any run, and "
     "the roll factors have nothing to act on"
@@ -75,10 +73,7 @@ def read_ratios(model: BuiltinModel, points: FloatArray) -> Coupling:
     for part in chunks(len(points), CHUNK):
         history = model.fly(model.batch(points[part]), model.step, ("theta", "phi"))
         parts.append(coupling(history, boundaries=model.boundaries))
-    found = {name: np.concatenate([getattr(part, name) for part in parts]) for name in Coupling.__dataclass_fields__}
-    for name in ("ratio", "ratio_literal"):
-        found[name] = np.where(found[name] < ROUNDING, 0.0, found[name])
-    return Coupling(**found)
+    return Coupling(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in Coupling.__dataclass_fields__})
 
 
 def _screening(design: Design, effects: dict[str, MorrisIndices | None]) -> dict[str, Any]:

@@ -9,20 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from levelone._version import __version__
-from levelone.campaign import analysis
-from levelone.campaign.amplitudes import amplitudes_section
-from levelone.campaign.cases import cases_section
 from levelone.campaign.claims import Evidence
 from levelone.campaign.claims.evidence import assessed_evidence
 from levelone.campaign.claims.judge import judge
 from levelone.campaign.claims.record import FILE, Found, Record, Stamp, Trial, read_record
 from levelone.campaign.claims.sections import RANKED
-from levelone.campaign.coupling import coupling_section
-from levelone.campaign.delay import delay_section
 from levelone.campaign.describe import describe_study, provenance_hashes
-from levelone.campaign.models import Assessment, BuiltinModel
+from levelone.campaign.sampling import Clock, Progress, response_results, sample_study
+from levelone.campaign.sections import run_sections
 from levelone.campaign.store import write_json
-from levelone.campaign.study import Progress, build_model, response_results
+from levelone.campaign.study import build_model
 from levelone.campaign.sweep import sweep_check
 from levelone.config.experiments_file import Experiment, Experiments, Finding, load_experiments
 from levelone.config.files import file_hash
@@ -30,7 +26,6 @@ from levelone.config.study_file import Study
 from levelone.dynamics import trim
 from levelone.dynamics.simulate import check_before_flight
 from levelone.errors import InputError
-from levelone.uncertainty import Design, Responses, latin_hypercube, morris_design, sobol_design, stage_seed
 from levelone.vehicle import batch_of
 
 BASELINE = "as it is"
@@ -106,45 +101,12 @@ def evaluate(study: Study, seed: int, threads: int | None = None, progress: Prog
     """
     study = replace(study, method=replace(study.method, bootstrap=BOOTSTRAP))
     model = build_model(study, threads)
-    nominal = model.nominal()
-    screening = morris_design(study.space, study.method.trajectories, study.method.levels, stage_seed(seed, "morris"))
-    screened = model.assess(screening.points)
-    sample = latin_hypercube(study.space, study.method.samples, stage_seed(seed, "monte carlo"))
-    assessed = model.assess(sample.points)
-    base = sobol_design(study.space, study.method.base_points, stage_seed(seed, "sobol"))
-    options = {"correlation": study.method.kernel, "trend": study.method.trend}
-    read = _only(assessed, RANKED)
-    found = analysis.decompose(
-        sample, read, base, study.policy, stage_seed(seed, "surrogates"), study.method.bootstrap, options, threads, progress
-    )
-    summary = {
-        "study": describe_study(study, seed),
-        "responses": response_results(study, nominal, screening, screened, sample, read, found),
-    }
-    return assessed_evidence(summary | _sections(study, model, sample, seed, progress), sample, assessed)
-
-
-def _only(assessed: Assessment, names: tuple[str, ...]) -> Assessment:
-    """The assessment with some of its responses."""
-    r = assessed.responses
-    columns = [r.names.index(name) for name in names]
-    units = tuple(r.units[j] for j in columns)
-    return replace(assessed, responses=Responses(r.values[:, columns], r.status[:, columns], names, units))
-
-
-def _sections(study: Study, model: BuiltinModel, sample: Design, seed: int, progress: Progress) -> dict[str, Any]:
-    """The sections that claims read, where the study asks for them."""
-    out: dict[str, Any] = {
-        "sweep": sweep_check(model, study.sweep, study.windows).summary(),
-        "without_delay": delay_section(study, model, sample),
-    }
-    if study.amplitudes:
-        out["amplitudes"] = amplitudes_section(replace(study, amplitudes=(min(study.amplitudes),)), model)[0]
-    if study.cases:
-        out["cases"] = cases_section(study, model)
-    if study.coupling is not None:
-        out["coupling"] = coupling_section(study, model, seed, progress)
-    return out
+    sampled = sample_study(study, model, model.nominal(), seed, threads, progress, Clock(), RANKED)
+    summary = {"study": describe_study(study, seed), "responses": response_results(study, sampled)}
+    asked = replace(study, amplitudes=(min(study.amplitudes),) if study.amplitudes else (), froude=None, deceleration=None)
+    sections = run_sections(asked, model, sampled.sample, sampled.assessed, seed, progress).results
+    sections["sweep"] = sweep_check(model, study.sweep, study.windows).summary()
+    return assessed_evidence(summary | sections, sampled.sample, sampled.assessed)
 
 
 def _trial(plan: Experiments, experiment: Experiment | None, seed: int, threads: int | None) -> Trial:

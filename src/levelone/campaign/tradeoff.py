@@ -11,6 +11,7 @@ import numpy as np
 from levelone.campaign.calibration import Fit, fit, rounded
 from levelone.campaign.models import BuiltinModel
 from levelone.config.calibration_file import Calibration
+from levelone.config.calibration_sections import Tradeoff
 from levelone.vehicle.tables import FloatArray
 
 #: relative change of the cost at which a point of a curve counts as found: well below the width of a line
@@ -40,12 +41,10 @@ class Case:
 
 def cases_of(calibration: Calibration, solution: FloatArray) -> list[Case]:
     """Every point of every curve, each fitted from ``solution`` [parameters]; none where the file asks for no trade-off."""
-    return [] if calibration.tradeoff is None else list(_cases(calibration, solution))
+    return [] if calibration.tradeoff is None else list(_cases(calibration, calibration.tradeoff, solution))
 
 
-def _cases(calibration: Calibration, solution: FloatArray) -> Iterator[Case]:
-    tradeoff = calibration.tradeoff
-    assert tradeoff is not None
+def _cases(calibration: Calibration, tradeoff: Tradeoff, solution: FloatArray) -> Iterator[Case]:
     for family in (None, *tradeoff.families):
         moved = calibration if family is None else replace(calibration, parameters=family.parameters)
         centre = np.array([each.prior for each in moved.parameters])

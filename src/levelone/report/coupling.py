@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from levelone.campaign.coupling import DROPPED, PITCH, ROUNDING, relative
+from levelone.campaign.coupling import DROPPED, PITCH, relative
+from levelone.handling.coupling import ROUNDING
 from levelone.report import style, symbols
 from levelone.report.formatting import interval, number, percent, percent_interval
 from levelone.report.pictures import Picture

@@ -1,0 +1,121 @@
+"""A study's samples: screening, Monte Carlo, surrogates and decomposition, each from its own seed, and what they come to."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from levelone.campaign import analysis
+from levelone.campaign.models import RESPONSES, Assessment, BuiltinModel
+from levelone.config.study_file import Study
+from levelone.status import Status
+from levelone.uncertainty import Design, Responses, latin_hypercube, morris_design, sobol_design, stage_seed
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass
+class Clock:
+    """Wall time of each stage, s."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time one stage."""
+        start = time.perf_counter()
+        yield
+        self.seconds[name] = round(time.perf_counter() - start, 3)
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """The nominal assessment, the two designs with theirs, and the decomposition of ``read``, the responses it was asked for."""
+
+    nominal: Assessment
+    screening: Design
+    screened: Assessment
+    sample: Design
+    assessed: Assessment
+    read: Assessment
+    found: analysis.Decomposition
+
+
+def sample_study(
+    study: Study,
+    model: BuiltinModel,
+    nominal: Assessment,
+    seed: int,
+    threads: int | None,
+    progress: Progress,
+    clock: Clock,
+    names: tuple[str, ...] = tuple(RESPONSES),
+) -> Sampled:
+    """Screen, sample and decompose; ``names`` are the responses that get surrogates and indices."""
+    method = study.method
+    with clock.stage("morris"):
+        screening = morris_design(study.space, method.trajectories, method.levels, stage_seed(seed, "morris"))
+        screened = _assess(model, screening, "screening (Morris)", progress)
+    with clock.stage("monte_carlo"):
+        sample = latin_hypercube(study.space, method.samples, stage_seed(seed, "monte carlo"))
+        assessed = _assess(model, sample, "Monte Carlo", progress)
+    read = _only(assessed, names)
+    with clock.stage("decomposition"):
+        base = sobol_design(study.space, method.base_points, stage_seed(seed, "sobol"))
+        options = {"correlation": method.kernel, "trend": method.trend}
+        found = analysis.decompose(
+            sample, read, base, study.policy, stage_seed(seed, "surrogates"), method.bootstrap, options, threads, progress
+        )
+    return Sampled(nominal, screening, screened, sample, assessed, read, found)
+
+
+def _assess(model: BuiltinModel, design: Design, stage: str, progress: Progress) -> Assessment:
+    progress(stage, 0, design.runs)
+    return model.assess(design.points, lambda done: progress(stage, min(done, design.runs), design.runs))
+
+
+def _only(assessed: Assessment, names: tuple[str, ...]) -> Assessment:
+    """The assessment with some of its responses."""
+    r = assessed.responses
+    columns = [r.names.index(name) for name in names]
+    units = tuple(r.units[j] for j in columns)
+    return replace(assessed, responses=Responses(r.values[:, columns], r.status[:, columns], names, units))
+
+
+def response_results(study: Study, s: Sampled) -> dict[str, Any]:
+    """The block of each response in results.json, for those that were decomposed."""
+    effects = analysis.screen(s.screening, s.screened, study.policy, study.method.bootstrap)
+    out: dict[str, Any] = {}
+    for j, name in enumerate(s.read.responses.names):
+        unit, criterion = RESPONSES[name]
+        failures, cautions = analysis.outcomes(s.read, name)
+        block: dict[str, Any] = {
+            "unit": unit,
+            "criterion": criterion,
+            "nominal": float(s.nominal.responses.column(name)[0]),
+            "status": Status(int(s.nominal.responses.codes(name)[0])).text,
+            "morris": analysis.morris_json(study.space, effects[name]),
+            "morris_failed": int(s.screened.responses.failed(name).sum()),
+            "morris_unit": f"{unit} per full factor range",
+            "monte_carlo": analysis.statistics(s.read.responses.column(name)),
+            "failures": failures,
+            "cautions": cautions,
+            "failure_corner": analysis.corner(s.sample, s.read, name),
+            "surrogate": analysis.surrogate_json(study.space, s.found.surrogates[j]),
+            "sobol": analysis.sobol_json(study.space, s.found.indices[j]),
+            "rank_agreement": analysis.agreement(effects[name], s.found.indices[j]),
+        }
+        if study.policy == "refuse" and failures:
+            nan = {"S1": np.nan, "ST": np.nan, "S1_ci": [np.nan, np.nan], "ST_ci": [np.nan, np.nan]}
+            block["sobol"] = {factor: dict(nan) for factor in study.space.names}
+            block["surrogate"]["status"] = f"refused: {sum(failures.values())} runs failed and the study's policy is 'refuse'"
+        if name in s.found.bounded:
+            low, high = (analysis.sobol_json(study.space, s, intervals=False) for s in s.found.bounded[name])
+            block["sobol_bounded"] = {"low": low, "high": high}
+        out[name] = block
+    return out
