@@ -292,14 +292,14 @@ def test_each_stage_has_one_progress_bar(capsys):
 def test_the_first_run_says_that_it_compiles(monkeypatch, tmp_path, capsys):
     from levelone.console import announce_compilation
 
-    monkeypatch.setattr("levelone.compiled.cache_folder", lambda: str(tmp_path))
+    monkeypatch.setattr("levelone.compiled.cache_folder", lambda folders: str(tmp_path))
     announce_compilation()
     assert "compiling the kernels (first run only" in capsys.readouterr().err
     (tmp_path / "sub").mkdir()
     (tmp_path / "sub" / "kernel.nbc").touch()
     announce_compilation()
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr("levelone.compiled.cache_folder", lambda: None)
+    monkeypatch.setattr("levelone.compiled.cache_folder", lambda folders: None)
     announce_compilation()
     assert "every run" in capsys.readouterr().err
 

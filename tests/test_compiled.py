@@ -21,11 +21,16 @@ def folder_seen_by_a_new_process(cache: Path) -> str:
 def test_folder_is_named_by_the_sources(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Another file of kernels, another folder: Numba itself would go on using the old code of their callers."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    before = compiled.cache_folder.__wrapped__()
-    monkeypatch.setattr(compiled, "FOLDERS", ("dynamics", "handling"))
-    after = compiled.cache_folder.__wrapped__()
+    before = compiled.cache_folder.__wrapped__(("dynamics", "handling", "vehicle"))
+    after = compiled.cache_folder.__wrapped__(("dynamics", "handling"))
     assert before != after
     assert str(tmp_path) in str(before)
+
+
+def test_parts_that_do_not_call_each_other_keep_their_code_apart() -> None:
+    assert compiled.folders_with("levelone.aerodynamics.kernels") == ("aerodynamics",)
+    assert compiled.folders_with("levelone.handling.peaks") == compiled.folders_with("levelone.dynamics.model")
+    assert "aerodynamics" not in compiled.folders_with("levelone.vehicle.tables")
 
 
 def test_private_folder_or_none(tmp_path: Path) -> None:

@@ -20,15 +20,22 @@ from typing import Any
 import numba
 
 FASTMATH = {"contract", "arcp", "nsz", "reassoc"}
-FOLDERS = ("dynamics", "handling", "vehicle")
+#: folders whose kernels call each other; a change in one leaves the machine code of the other groups as it is
+GROUPS = (("dynamics", "handling", "vehicle"), ("aerodynamics",))
+
+
+def folders_with(module: str) -> tuple[str, ...]:
+    """The group of folders that a module of the package belongs to; the first one for everything else."""
+    parts = module.split(".")
+    return next((group for group in GROUPS if len(parts) > 1 and parts[1] in group), GROUPS[0])
 
 
 @cache
-def cache_folder() -> str | None:
+def cache_folder(folders: tuple[str, ...] = GROUPS[0]) -> str | None:
     """The user's own folder for machine code, or None where it cannot be written; never a folder that others can write to."""
     root = Path(__file__).parent
     digest = hashlib.blake2b(numba.__version__.encode(), digest_size=8)
-    for folder in FOLDERS:
+    for folder in folders:
         for source in sorted((root / folder).rglob("*.py")):
             digest.update(source.read_bytes())
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
@@ -43,7 +50,7 @@ def cache_folder() -> str | None:
 
 def _decorate(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:
     def decorate(function: Callable[..., Any]) -> Any:
-        folder = cache_folder()
+        folder = cache_folder(folders_with(function.__module__))
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = folder or before
         try:

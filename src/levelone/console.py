@@ -68,7 +68,7 @@ def numbers(text: str, field: str) -> list[float]:
 
 
 @contextmanager
-def csv_draft(path: Path | None) -> Iterator[Path | None]:
+def csv_draft(path: Path | None, field: str = "--csv") -> Iterator[Path | None]:
     """A place to write to that becomes ``path`` when the block ends well; None where no file was asked for.
 
     Raises
@@ -85,7 +85,7 @@ def csv_draft(path: Path | None) -> Iterator[Path | None]:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
         os.close(handle)
     except OSError as error:
-        raise InputError("--csv", f"cannot write {path}: {error.strerror}") from None
+        raise InputError(field, f"cannot write {path}: {error.strerror}") from None
     draft = Path(name)
     try:
         yield draft
@@ -129,11 +129,11 @@ def _console(stderr: bool = False) -> Console:
     return Console(stderr=stderr, highlight=False, markup=False, width=None if stream.isatty() else 200)
 
 
-def announce_compilation() -> None:
-    """Say that the first run compiles, where it does."""
-    from levelone.compiled import cache_folder
+def announce_compilation(part: str = "dynamics") -> None:
+    """Say that the first run compiles the kernels of a part of the package, where it does."""
+    from levelone.compiled import cache_folder, folders_with
 
-    folder = cache_folder()
+    folder = cache_folder(folders_with(f"levelone.{part}"))
     if folder is None:
         say("compiling the kernels (no folder for compiled code can be written: this happens in every run) ...")
     elif not any(Path(folder).rglob("*.nbc")):

@@ -1,0 +1,1 @@
+"""Unsteady aerodynamics: vortex lattice and vortex-particle wake, dynamic derivatives against reduced frequency."""
