@@ -18,6 +18,7 @@ from levelone.console import (
     stage_bars,
     write_csv,
 )
+from levelone.derivatives_command import derivatives
 
 EPILOG = f"""\b
 What to do next:
@@ -27,6 +28,7 @@ What to do next:
   levelone run studies/reference/study.toml       the whole study: a few minutes, ends with report.html
   levelone compare results/reference              the published findings, decided on that run
   levelone calibrate studies/reference/calibration.toml   how the unpublished numbers were found
+  levelone derivatives reference-wing-tail        aerodynamic derivatives of a geometry, against reduced frequency
 
 \b
 Your own aircraft: copy reference-evtol.toml and its two tables, change the numbers, and give the path of your
@@ -232,6 +234,9 @@ def linearize(
             write_csv(draft, columns.response_record(model, command, output, frequencies))
         else:
             show(f"Poles of {aircraft.name} at {speed:g} m/s, {mode} mode", columns.pole_table(model, command, output))
+
+
+app.command()(derivatives)
 
 
 def main() -> None:

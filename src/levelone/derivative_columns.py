@@ -8,19 +8,18 @@ from typing import Any
 from levelone.aerodynamics.derivatives import Derivatives, Static
 
 Columns = dict[str, Sequence[Any]]
-#: coefficients that a motion of the plane of symmetry, or one across it, gives rise to; the first are those of the published study
+#: coefficients that motions in the plane of symmetry, and across it, give rise to
 OF_AXIS = {"longitudinal": ("C_L", "C_m", "C_D"), "lateral": ("C_Y", "C_l", "C_n")}
 
 
 def record(found: Sequence[tuple[float, Derivatives]], axis: str) -> Columns:
     """One row for each motion, reduced frequency and speed (m/s); ``found`` holds the derivatives of each speed.
 
-    Quadrature parts are divided by the reduced frequency of the motion (that of the span for lateral ones); each value is followed by
-    the half-width of its error bar in a column of its own name with ``_error``.
+    Quadrature parts are divided by the reduced frequency of the motion (that of the span for lateral ones); each value is followed
+    by the half-width of its error bar in a column of its own name with ``_error``.
     """
-    rows = [
-        (speed, each, i, j) for i in range(len(found[0][1].motions)) for j in range(len(found[0][1].k)) for speed, each in found
-    ]
+    motions, k = found[0][1].motions, found[0][1].k
+    rows = [(speed, each, i, j) for i in range(len(motions)) for j in range(len(k)) for speed, each in found]
     columns: Columns = {
         "motion": [each.motions[i] for _, each, i, _ in rows],
         "k": [float(each.k[j]) for _, each, _, j in rows],
@@ -62,4 +61,5 @@ def static_table(found: Static, axis: str) -> Columns:
         names = [f"{name}0" for name in OF_AXIS[axis]] + names
         value, error = [float(found.rest[c]) for c in rest] + value, [float(found.rest_error[c]) for c in rest] + error
         ordinary = [float(found.ordinary_rest[c]) for c in rest] + ordinary
-    return {"derivative": names, "value": value, "+-": error, "ordinary grid off by": [a - b for a, b in zip(ordinary, value, strict=True)]}
+    off = [a - b for a, b in zip(ordinary, value, strict=True)]
+    return {"derivative": names, "value": value, "+-": error, "ordinary grid off by": off}

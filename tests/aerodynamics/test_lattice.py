@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from shapes import geometry, tail, wing
 
+from levelone.aerodynamics.frequency import prepare, steady
 from levelone.aerodynamics.geometry import Surface
 from levelone.aerodynamics.kernels import influence, velocities
 from levelone.aerodynamics.lattice import build, rings
@@ -137,3 +138,24 @@ def test_net_circulation_is_that_of_the_bound_vortices():
     found = net(lattice, gamma)
     assert found[lattice.first].tolist() == gamma[lattice.first].tolist()
     np.testing.assert_array_equal(np.delete(found, lattice.first), 1.0)
+
+
+@given(st.floats(-0.2, 0.2), st.floats(0.1, 0.4), st.floats(0.0, 0.4))
+def test_bound_vortices_are_loaded_on_themselves(twist, tip_chord, sweep):
+    """Beside its own straight segment a point would see a huge velocity: on a twisted surface the mean surface is not straight."""
+    surface = Surface("wing", (0.0, 0.0, 0.0), 1.5, 0.3, tip_chord, sweep=sweep, twist=twist, chordwise=3, strips=4)
+    lattice = build(geometry(surface))
+    along, to = lattice.bound[:, 1] - lattice.bound[:, 0], lattice.midpoint - lattice.bound[:, 0]
+    off = np.linalg.norm(np.cross(along, to), axis=1) / np.linalg.norm(along, axis=1)
+    assert np.max(off) < 1e-15
+    assert np.all(np.einsum("na,na->n", along, to) > 0.0)
+
+
+@given(st.floats(0.01, 0.1))
+def test_twist_is_lift_between_root_and_tip(angle):
+    """Washout from incidence to zero: between half and all of the lift of the untwisted wing; drag positive."""
+    whole, washed = (
+        np.asarray(steady(prepare(build(geometry(wing(3, 6, incidence=angle, twist=twist)))))) for twist in (0.0, -angle)
+    )
+    assert 0.5 * whole[0] < washed[0] < 0.7 * whole[0]
+    assert 0.0 < washed[1] < whole[1]

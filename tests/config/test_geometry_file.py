@@ -78,7 +78,7 @@ def test_the_shipped_geometries_hold_what_the_study_prints():
 def test_panels_of_wing_and_tail_are_equally_long():
     wing, tail, plate = load_geometry("reference-evtol").surfaces
     assert {surface.root_chord / surface.chordwise for surface in (wing, tail, plate)} == {0.0325}
-    assert [(surface.chordwise, surface.strips) for surface in (wing, tail, plate)] == [(8, 20), (4, 8), (4, 8)]
+    assert [(surface.chordwise, surface.strips) for surface in (wing, tail, plate)] == [(8, 10), (4, 4), (4, 4)]
 
 
 def test_end_plates_stand_on_the_tips_of_the_tail():

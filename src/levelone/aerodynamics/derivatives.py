@@ -43,6 +43,7 @@ class Derivatives:
     quadrature_error: FloatArray
     ordinary_in_phase: FloatArray
     ordinary_quadrature: FloatArray
+    failures: tuple[str, ...] = ()  # what is undefined (NaN) and why
 
     def at(self, motion: str, coefficient: str) -> tuple[FloatArray, FloatArray]:
         """Quadrature [k] of a coefficient and its error."""
@@ -82,11 +83,7 @@ def dynamic(
         A reduced frequency that is not positive (at k = 0 nothing oscillates, and the quadrature part cannot be divided by it), or
         one whose waves in the wake are too short for the panels.
     """
-    k = np.atleast_1d(np.asarray(k, dtype=np.float64))
-    bad = [each for each in k if not (np.isfinite(each) and each > 0.0)]
-    if bad:
-        raise InputError("k", f"{bad[0]:g} is no reduced frequency of an oscillation: it must be positive and finite")
-    _check_resolution(geometry, k)
+    k = check_frequencies(geometry, k)
     about = np.array(geometry.reference_point if centre is None else centre)
     found = np.stack([oscillate(prepare(grid), k, motions, about, threads) for grid in grids(geometry)])
     lateral = np.array([motion in LATERAL for motion in motions])
@@ -97,12 +94,21 @@ def dynamic(
     )
 
 
-def _check_resolution(geometry: Geometry, k: FloatArray) -> None:
-    """Refuse waves of the wake, pi c/k long, that are shorter than ``_PANELS`` panels of the ordinary grid."""
+def check_frequencies(geometry: Geometry, k: FloatArray) -> FloatArray:
+    """Reduced frequencies [n] at which the geometry's grid can oscillate; InputError for others.
+
+    The waves of the wake, pi c/k long, need :data:`_PANELS` panels of the ordinary grid.
+    """
+    k = np.atleast_1d(np.asarray(k, dtype=np.float64))
+    bad = [each for each in k if not (np.isfinite(each) and each > 0.0)]
+    if bad:
+        raise InputError("k", f"{bad[0]:g} is no reduced frequency of an oscillation: it must be positive and finite")
     panel = max(float(surface.root_chord) / surface.chordwise for surface in geometry.surfaces)
     highest = np.pi * geometry.chord / (_PANELS * panel)
     if np.max(k) > highest:
-        raise InputError("k", f"{np.max(k):g} is too high for panels of {panel:.3g} m: at most {highest:.3g}, or more chordwise panels")
+        allowed = f"at most {highest:.3g}, or more chordwise panels"
+        raise InputError("k", f"{np.max(k):g} is too high for panels of {panel:.3g} m: {allowed}")
+    return k
 
 
 def static(geometry: Geometry) -> Static:

@@ -1,13 +1,13 @@
 """Converged values from three similar grids, with an error bar.
 
-On grids of 1, 2 and 3 halves of the ordinary panel counts (cell sizes 1, 1/2, 1/3) the lattice approaches its limit with the square of
-the cell size where every surface is straight and level. A kink (sweep, taper, dihedral, a fin on a tip) adds a part of first order. The
-limit is extrapolated accordingly (Richardson 1911; error bars reported as Roache 1994 asks for):
+On grids of 1, 2 and 3 halves of the ordinary panel counts (cell sizes 1, 1/2, 1/3) the lattice approaches its limit with the square
+of the cell size where every surface is straight and level. A kink (sweep, taper, dihedral, a fin on a tip) adds a part of first
+order. The limit is extrapolated accordingly (Richardson 1911; error bars reported as Roache 1994 asks for):
 
 * straight: the second-order limit of the two finer grids. Bar: its distance from the limit with a second- and a fourth-order term
   through all three, doubled, and a tenth of the correction;
-* kinked: the middle between that limit and the one with a first- and a second-order term. Bar: three quarters of their distance, and a
-  tenth of the correction.
+* kinked: the middle between that limit and the one with a first- and a second-order term. Bar: three quarters of their distance,
+  and a tenth of the correction.
 
 The factors were set on 112 quantities of seven geometries against grids of 6 and 9 halves; the tests repeat the comparison.
 """

@@ -26,6 +26,8 @@ ComplexArray = NDArray[np.complex128]
 LUMPED = 2.0
 #: mean circulation below this share of V c counts as none
 UNLOADED = 1e-12
+#: free stream of unit speed
+STREAM = (1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class Plant:
 
 
 @dataclass(frozen=True)
-class _Wakes:
+class Wakes:
     """Velocities by the wakes of strips of unit circulation at one frequency."""
 
     normal: ComplexArray  # [p, m] at the collocation points, along the normal
@@ -70,13 +72,13 @@ def prepare(lattice: Lattice) -> Plant:
     plant = Plant(
         lattice, carriers(lattice, h), shed_line(lattice, starts(h) + 0.5 * h), rows,
         influence(lattice.collocation[:half], lattice.normal[:half], corners), np.empty((3, 0, 0)), np.zeros(count),
-        np.tile([1.0, 0.0, 0.0], (count, 1)),
+        np.tile(STREAM, (count, 1)),
     )  # fmt: skip
     if np.max(np.abs(lattice.normal[:, 0])) < UNLOADED:
         return plant
     plant = replace(plant, vectors=influence_vectors(lattice.midpoint[:half], corners))
-    wakes = _wakes(plant, 0.0)
-    gamma = _solve(plant, wakes, plant.wind[:, :, None].astype(complex), 1.0)[:, 0]
+    wakes = wakes_at(plant, 0.0)
+    gamma = circulations(plant, wakes, plant.wind[:, :, None].astype(complex), 1.0)[:, 0]
     return replace(plant, mean=gamma.real, wind=plant.wind + _induced(plant, wakes, gamma, 1.0).real)
 
 
@@ -106,39 +108,55 @@ def oscillate(plant: Plant, k: FloatArray, motions: tuple[str, ...], centre: Flo
 
 def steady(plant: Plant) -> Coefficients:
     """Coefficients of the geometry at rest in the stream."""
-    lattice, carrier = plant.lattice, plant.carrier
-    bound = bound_forces(carrier, plant.wind, net(lattice, plant.mean))
-    side = side_forces(carrier, np.broadcast_to([1.0, 0.0, 0.0], carrier.side.shape), plant.mean)
-    return coefficients(lattice, *_sum(plant, bound, side, np.zeros_like(bound)))
+    bound, side = forces_at_rest(plant)
+    return coefficients(plant.lattice, *_sum(plant, bound, side, np.zeros_like(bound)))
+
+
+def forces_at_rest(plant: Plant) -> tuple[FloatArray, FloatArray]:
+    """Forces over density at unit speed on the bound vortices [n, 3] and the side segments [n, 2, 3], m^2."""
+    carrier = plant.carrier
+    bound = bound_forces(carrier, plant.wind, net(plant.lattice, plant.mean))
+    return bound, side_forces(carrier, np.broadcast_to(STREAM, carrier.side.shape), plant.mean)
 
 
 def _at(plant: Plant, k: float, motions: tuple[str, ...], centre: FloatArray) -> ComplexArray:
     kappa = 2.0 * k / plant.lattice.chord
-    wakes = _wakes(plant, kappa)
+    wakes = wakes_at(plant, kappa)
     found = np.empty((len(motions), len(NAMES)), dtype=complex)
     for sign in (1.0, -1.0):
         chosen = [i for i, motion in enumerate(motions) if modes.antisymmetric(motion) == (sign < 0.0)]
         if chosen:
             winds = [modes.relative_wind(motions[i], plant.lattice.collocation, centre, kappa) for i in chosen]
-            gammas = _solve(plant, wakes, np.stack(winds, axis=2), sign)
+            gammas = circulations(plant, wakes, np.stack(winds, axis=2), sign)
             for i, gamma in zip(chosen, gammas.T, strict=True):
                 found[i] = _answer(plant, wakes, motions[i], gamma, centre, kappa)
     return found
 
 
-def _answer(plant: Plant, wakes: _Wakes, motion: str, gamma: ComplexArray, centre: FloatArray, kappa: float) -> ComplexArray:
+def _answer(plant: Plant, wakes: Wakes, motion: str, gamma: ComplexArray, centre: FloatArray, kappa: float) -> ComplexArray:
     """Coefficients [6] of a motion whose circulations [n] are known."""
+    bound, side = forces(plant, wakes, motion, gamma, centre, kappa)
+    change = coefficients(plant.lattice, *_sum(plant, bound, side, rate_forces(plant.carrier, 1j * kappa * gamma)))
+    return in_wind_axes(change, steady(plant), modes.INCIDENCE.get(motion, 0.0))
+
+
+def forces(
+    plant: Plant, wakes: Wakes, motion: str, gamma: ComplexArray, centre: FloatArray, kappa: float
+) -> tuple[ComplexArray, ComplexArray]:
+    """Changes of the forces over density on bound vortices [n, 3] and side segments [n, 2, 3] with a unit of a motion, m^2.
+
+    ``gamma`` [n] are the circulations of the motion; the mean load meets the motion's wind and what they induce.
+    """
     lattice, carrier = plant.lattice, plant.carrier
     bound = bound_forces(carrier, plant.wind.astype(complex), net(lattice, gamma))
-    side = side_forces(carrier, np.broadcast_to([1.0 + 0j, 0.0, 0.0], carrier.side.shape), gamma)
+    side = side_forces(carrier, np.broadcast_to(STREAM, carrier.side.shape).astype(complex), gamma)
     if plant.loaded:
         sign = -1.0 if modes.antisymmetric(motion) else 1.0
         wind = modes.relative_wind(motion, lattice.midpoint, centre, kappa) + _induced(plant, wakes, gamma, sign)
         bound += bound_forces(carrier, wind, net(lattice, plant.mean).astype(complex))
         at_sides = modes.relative_wind(motion, carrier.side_middle.reshape(-1, 3), centre, kappa).reshape(carrier.side.shape)
         side += side_forces(carrier, at_sides, plant.mean.astype(complex))
-    change = coefficients(lattice, *_sum(plant, bound, side, rate_forces(carrier, 1j * kappa * gamma)))
-    return in_wind_axes(change, steady(plant), modes.INCIDENCE.get(motion, 0.0))
+    return bound, side
 
 
 def _sum(plant: Plant, bound: Array, side: Array, ring: Array) -> tuple[Array, Array]:
@@ -148,13 +166,14 @@ def _sum(plant: Plant, bound: Array, side: Array, ring: Array) -> tuple[Array, A
     return np.sum([force for force, _ in sums], axis=0), np.sum([moment for _, moment in sums], axis=0)
 
 
-def _wakes(plant: Plant, kappa: float) -> _Wakes:
+def wakes_at(plant: Plant, kappa: float) -> Wakes:
+    """Velocities by the wakes at omega/V = ``kappa``, 1/m; 0: steady."""
     lattice = plant.lattice
     at_points = harmonic_wake(lattice.collocation[: plant.half], plant.lines, lattice.last, plant.rows, kappa)
     normal = np.einsum("apm,pa->pm", at_points, lattice.normal[: plant.half])
     if not plant.loaded:
-        return _Wakes(normal, np.empty((3, 0, 0), dtype=complex))
-    return _Wakes(normal, harmonic_wake(lattice.midpoint[: plant.half], plant.lines, lattice.last, plant.rows, kappa))
+        return Wakes(normal, np.empty((3, 0, 0), dtype=complex))
+    return Wakes(normal, harmonic_wake(lattice.midpoint[: plant.half], plant.lines, lattice.last, plant.rows, kappa))
 
 
 def _fold(plant: Plant, matrix: Array, sign: float) -> Array:
@@ -165,7 +184,7 @@ def _fold(plant: Plant, matrix: Array, sign: float) -> Array:
     return np.asarray(matrix[..., :half] + sign * matrix[..., half:])
 
 
-def _solve(plant: Plant, wakes: _Wakes, winds: ComplexArray, sign: float) -> ComplexArray:
+def circulations(plant: Plant, wakes: Wakes, winds: ComplexArray, sign: float) -> ComplexArray:
     """Circulations [n, motion] of the rings that let no wind [n, 3, motion] through the collocation points."""
     half = plant.half
     matrix = _fold(plant, plant.influence, sign).astype(complex)
@@ -175,14 +194,14 @@ def _solve(plant: Plant, wakes: _Wakes, winds: ComplexArray, sign: float) -> Com
     return np.concatenate([gamma, sign * gamma]) if plant.lattice.mirrored else gamma
 
 
-def _induced(plant: Plant, wakes: _Wakes, gamma: ComplexArray, sign: float) -> ComplexArray:
+def _induced(plant: Plant, wakes: Wakes, gamma: ComplexArray, sign: float) -> ComplexArray:
     """Velocity [n, 3] at the bound vortices, for circulations [n] that are mirrored with a sign."""
     wind = (plant.vectors @ gamma + wakes.vectors @ gamma[plant.lattice.trailing]).T
     return np.concatenate([wind, sign * wind * [1.0, -1.0, 1.0]]) if plant.lattice.mirrored else wind
 
 
 def _rows(lattice: Lattice) -> IntArray:
-    """Lumped rows of the wake of each strip [m]: over a fixed length, as for the bound vortices, and out of reach of what lies behind.
+    """Lumped rows of the wake of each strip [m]: over a fixed length, and out of reach of what lies behind.
 
     A fixed number of rows would leave an error at their end that does not vanish with the size of the panels.
     """

@@ -75,7 +75,7 @@ def _interval(low, high, kappa, origin, px, py, pz, line, total):
     for i in range(_X.size):
         x = middle + half * _X[i]
         weight = half * _W[i] * np.exp(-1j * kappa * (x - origin))
-        ux, uy, uz = _horseshoe(x + 0j, px, py, pz, line)
+        ux, uy, uz = _horseshoe(x, px, py, pz, line)
         total[0] += weight * ux
         total[1] += weight * uy
         total[2] += weight * uz
@@ -122,14 +122,14 @@ def harmonic_wake(points, lines, step, rows, kappa):
         px, py, pz = points[i, 0], points[i, 1], points[i, 2]
         for j in range(lines.shape[0]):
             line = lines[j]
-            ux, uy, uz = _horseshoe(0j, px, py, pz, line)
+            ux, uy, uz = _horseshoe(0.0, px, py, pz, line)
             out[0, i, j], out[1, i, j], out[2, i, j] = ux, uy, uz
             if kappa == 0.0:
                 continue
             turn = np.exp(-1j * kappa * step[j])
             mu = 1.0 + 0j
             for row in range(rows[j]):
-                ux, uy, uz = _horseshoe(row * step[j] + 0j, px, py, pz, line)
+                ux, uy, uz = _horseshoe(row * step[j], px, py, pz, line)
                 jump = mu * (turn - 1.0)
                 out[0, i, j] += jump * ux
                 out[1, i, j] += jump * uy

@@ -112,7 +112,7 @@ def _strips(surface: Surface, breaks: FloatArray, counts: tuple[int, ...]) -> li
         found.append(
             _Strip(
                 np.stack([left, right], axis=1), points(surface, s, control), normal / np.linalg.norm(normal, axis=1)[:, None],
-                points(surface, s, vortex), points(surface, np.array([a, b]), 1.0), tangents(surface, s, 1.0),
+                left + (s - a) / (b - a) * (right - left), points(surface, np.array([a, b]), 1.0), tangents(surface, s, 1.0),
                 float(ends[-1] - ends[-2]) * chord, float((b - a) * surface.span), chord,
             )
         )  # fmt: skip

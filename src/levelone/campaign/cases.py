@@ -29,7 +29,8 @@ def cases_section(study: Study, model: BuiltinModel) -> dict[str, Any]:
 
     Everything that a case does not set is the nominal vehicle's, and so is the controller. Values and Levels are those of the
     study's step, pulse and linear response; for ``bandwidth`` also ``omega_bw_swept`` and ``tau_p_swept``, read on q / V_lon from
-    a sweep of the nonlinear model with ``AMPLITUDE``. ``level`` holds codes of :class:`levelone.handling.levels.Level`.
+    a sweep of the nonlinear model with ``AMPLITUDE``. ``level`` holds codes of :class:`levelone.handling.levels.Level`. Where the
+    file has other numbers for the same cases, ``beside`` is a block of the same form.
     """
     return {cases.criterion: _block(study, model, cases) for cases in study.cases}
 
@@ -51,7 +52,8 @@ def _block(study: Study, model: BuiltinModel, cases: Cases) -> dict[str, Any]:
             values[name] = [float(np.ravel(getattr(check.swept_reading, key))[0]) for check in checks]
             status[name] = _words([_outcome(check, code) for check in checks])
         block |= {"amplitude": AMPLITUDE, "omega_max": [check.manoeuvre.omega_max for check in checks]}
-    return block | {"values": values, "status": status, "level": assessed.levels[cases.criterion].tolist()}
+    block |= {"values": values, "status": status, "level": assessed.levels[cases.criterion].tolist()}
+    return block if cases.beside is None else block | {"beside": _block(study, model, cases.beside)}
 
 
 def _sweeps(study: Study, varied: BuiltinModel, cases: Cases) -> list[SweepCheck]:

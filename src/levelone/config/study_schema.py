@@ -185,6 +185,13 @@ class CouplingTable(Strict):
     factor: Annotated[list[FactorTable], Field(min_length=1)]
 
 
+class BesideTable(Origin):
+    """[cases.beside]: other numbers for the same cases, row by row."""
+
+    name: Text
+    rows: Annotated[list[list[Finite]], Field(min_length=1)]
+
+
 class CasesTable(Origin):
     """[[cases]]: vehicles that differ from the nominal one in the columns, one a row."""
 
@@ -192,6 +199,7 @@ class CasesTable(Origin):
     criterion: Literal["attitude_quickness", "dynamic_stability", "bandwidth"]
     columns: Annotated[Texts, Field(min_length=1)]
     rows: Annotated[list[list[Finite]], Field(min_length=1)]
+    beside: BesideTable | None = None
 
 
 class PilotTable(Origin):

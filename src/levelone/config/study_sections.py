@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from levelone.config.factor_table import Inputs, check_corners, inputs_of
 from levelone.config.quantities import Quantity, origins
-from levelone.config.study_schema import CasesTable, CouplingTable, FactorTable, FroudeTable, StudyFile, in_words
+from levelone.config.study_schema import BesideTable, CasesTable, CouplingTable, FactorTable, FroudeTable, StudyFile, in_words
 from levelone.errors import InputError, unknown_name
 from levelone.handling.capture import Tolerances
 from levelone.handling.history import FloatArray
@@ -57,6 +57,8 @@ class Cases:
         Targets (names in ``levelone.vehicle.TARGETS``).
     rows
         [cases, columns] in the units of ``levelone.vehicle.TARGET_UNITS``; read-only.
+    beside
+        The same cases with other numbers, to be shown beside these; None where there are none.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Cases:
     columns: tuple[str, ...]
     rows: FloatArray
     source: str
+    beside: Cases | None = None
 
 
 @dataclass(frozen=True)
@@ -153,16 +156,30 @@ def _cases(table: CasesTable, vehicle: Vehicle, trim_speed: float) -> Cases:
             raise unknown_name(f"{path}.columns.{i}", target, TARGETS)
         if target in table.columns[: i - 1]:
             raise InputError(f"{path}.columns.{i}", f"{target!r} is given twice")
-    for i, row in enumerate(table.rows, 1):
+    made = Cases(table.name, table.criterion, tuple(table.columns), _rows(table, table, vehicle, trim_speed, path), in_words(table))
+    if table.beside is None:
+        return made
+    path = f"{path}.beside"
+    table.beside.require(path)
+    if len(table.beside.rows) != len(table.rows):
+        raise InputError(
+            f"{path}.rows", f"holds {len(table.beside.rows)} cases; must be the {len(table.rows)} of the table, in order"
+        )
+    rows = _rows(table.beside, table, vehicle, trim_speed, path)
+    return replace(made, beside=replace(made, name=table.beside.name, rows=rows, source=in_words(table.beside)))
+
+
+def _rows(given: CasesTable | BesideTable, table: CasesTable, vehicle: Vehicle, trim_speed: float, path: str) -> FloatArray:
+    for i, row in enumerate(given.rows, 1):
         if len(row) != len(table.columns):
             raise InputError(f"{path}.rows.{i}", f"holds {len(row)} numbers for {len(table.columns)} columns")
-    rows = np.array(table.rows, dtype=np.float64)
+    rows = np.array(given.rows, dtype=np.float64)
     try:
         vary(vehicle, table.columns, rows, trim_speed)
     except InputError as error:
         raise InputError(f"{path}.rows", f"{error.field} {error.problem}") from None
     rows.setflags(write=False)
-    return Cases(table.name, table.criterion, tuple(table.columns), rows, in_words(table))
+    return rows
 
 
 def froude_of(table: FroudeTable | None) -> Froude | None:
@@ -206,5 +223,6 @@ def assumed_of(content: StudyFile) -> tuple[tuple[str, str], ...]:
     found = list(origins(content))
     factors = [(f"factor.{each.name}", each) for each in content.factor]
     added = [(f"coupling.factor.{each.name}", each) for each in content.coupling.factor] if content.coupling is not None else []
-    lists = [*factors, *added, *((f"cases.{each.name}", each) for each in content.cases)]
+    beside = [(f"cases.{each.name}.beside", each.beside) for each in content.cases if each.beside is not None]
+    lists = [*factors, *added, *((f"cases.{each.name}", each) for each in content.cases), *beside]
     return (*found, *((path, table.assumed) for path, table in lists if table.assumed is not None))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -33,6 +33,8 @@ _FLOWN: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.0,
                           "zorder": 5}  # fmt: skip
 _SWEPT: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 4.0, "markerfacecolor": "white",
                           "markeredgecolor": style.BLUE, "markeredgewidth": 0.8, "zorder": 4}  # fmt: skip
+_BESIDE: dict[str, Any] = {"linestyle": "none", "marker": "s", "markersize": 3.8, "markeredgewidth": 0.0, "color": style.VERMILLION,
+                           "zorder": 5}  # fmt: skip
 _NOMINAL: dict[str, Any] = {"linestyle": "none", "marker": "D", "markersize": 4.6, "markerfacecolor": style.ORANGE,
                             "markeredgecolor": style.BLACK, "markeredgewidth": 0.7, "zorder": 6}  # fmt: skip
 
@@ -54,7 +56,8 @@ def context(results: Results) -> dict[str, Any] | None:
     given = results.summary.get("cases")
     if not given:
         return None
-    return {"blocks": [_block(results, key, given[key]) for key in CRITERIA if key in given]}
+    blocks = [_block(results, key, given[key]) for key in CRITERIA if key in given]
+    return {"blocks": blocks, "beside": sorted({block["beside"]["name"] for block in blocks if block["beside"]})}
 
 
 def pictures(results: Results) -> list[Picture]:
@@ -69,23 +72,42 @@ def pictures(results: Results) -> list[Picture]:
 
 
 def _block(results: Results, criterion: str, block: Mapping[str, Any]) -> dict[str, Any]:
-    names = list(block["values"])
+    names, beside = list(block["values"]), block.get("beside")
     units = [symbols.field_unit(results.responses[name.removesuffix("_swept")]["unit"]) for name in names]
+    scales = {name: scale for name, (scale, _) in zip(names, units, strict=True)}
     rows = []
     for i, row in enumerate(block["rows"]):
-        before = block["rows"][i - 1] if i else row
-        rows.append({
-            "number": i + 1,
-            "coefficients": [{"text": number(a), "changed": a != b} for a, b in zip(row, before, strict=True)],
-            "values": [_value(block, name, i, scale) for name, (scale, _) in zip(names, units, strict=True)],
-            "level": LEVEL_WORDS[Level(block["level"][i])],
-        })  # fmt: skip
+        rows.append(_row(f"{i + 1}", block, i, block["rows"][i - 1] if i else row, block, 0, scales))
+        if beside is not None:
+            rows.append(_row(f"{i + 1}, {beside['name']}", beside, i, row, block, i, scales))
     return {
+        "beside": beside and {"name": beside["name"], "source": beside["source"]},
         "criterion": criterion, "title": symbols.CRITERION_TITLES[criterion], "name": block["name"], "source": block["source"],
         "columns": [symbols.html(name) for name in block["columns"]], "rows": rows, "amplitude": block.get("amplitude"),
         "responses": [{"title": symbols.title(name), "head": symbols.html(name) + _reading(name), "unit": unit or "1"}
                       for name, (_, unit) in zip(names, units, strict=True)],
     }  # fmt: skip
+
+
+def _row(
+    label: str,
+    block: Mapping[str, Any],
+    i: int,
+    before: Sequence[float],
+    base: Mapping[str, Any],
+    j: int,
+    scales: Mapping[str, float],
+) -> dict[str, Any]:
+    """One case: coefficients that differ from ``before`` are marked; changes of the values are against case ``j`` of ``base``."""
+    return {
+        "number": label,
+        "coefficients": [{"text": number(a), "changed": a != b} for a, b in zip(block["rows"][i], before, strict=True)],
+        "values": [
+            _value(block, name, i, scale, math.nan if block is base and i == j else base["values"][name][j])
+            for name, scale in scales.items()
+        ],
+        "level": LEVEL_WORDS[Level(block["level"][i])],
+    }
 
 
 def _reading(name: str) -> str:
@@ -95,12 +117,12 @@ def _reading(name: str) -> str:
     return {"attitude": " (attitude)", "swept": " (rate, swept)"}.get(name.rpartition("_")[2], " (rate)")
 
 
-def _value(block: Mapping[str, Any], name: str, i: int, scale: float) -> str:
-    """A value with its change from the first case; where it is undefined or doubted, why."""
-    values, status = block["values"][name], block["status"][name][i]
-    text = number(scale * values[i])
-    if i and values[0] and math.isfinite(values[i]) and math.isfinite(values[0]):
-        text += f" ({100.0 * (values[i] / values[0] - 1.0):+.1f} %)".replace("-", "−")
+def _value(block: Mapping[str, Any], name: str, i: int, scale: float, base: float) -> str:
+    """A value with its change from ``base`` (NaN: none is given); where it is undefined or doubted, why."""
+    value, status = block["values"][name][i], block["status"][name][i]
+    text = number(scale * value)
+    if base and math.isfinite(value) and math.isfinite(base):
+        text += f" ({100.0 * (value / base - 1.0):+.1f} %)".replace("-", "−")
     return text if status == "ok" else f"{text}: {status}"
 
 
@@ -109,8 +131,13 @@ def draw_cases(results: Results, block: Mapping[str, Any], plane: Plane) -> Figu
     figure, axes = style.sheet(style.PAGE, 3.3, 1, 2, margins=_MARGINS)
     nominal = {name: np.array([entry["nominal"]]) for name, entry in results.responses.items()}
     clouds = [plane.place(block["values"], ""), plane.place(nominal, "")]
-    if any(name.endswith("_swept") for name in block["values"]):
+    swept = any(name.endswith("_swept") for name in block["values"])
+    if swept:
         clouds.append(plane.place(block["values"], "_swept"))
+    looks = [_FLOWN, _NOMINAL, _SWEPT][: len(clouds)]
+    beside = block.get("beside")
+    if beside is not None:
+        clouds, looks = [*clouds, plane.place(beside["values"], "")], [*looks, _BESIDE]
     known = np.vstack([cloud[np.isfinite(cloud).all(axis=1)] for cloud in clouds])
     shown = np.vstack([known, plane.least])
     _limit(axes[0, 0], shown, 0.08)
@@ -120,13 +147,13 @@ def draw_cases(results: Results, block: Mapping[str, Any], plane: Plane) -> Figu
         panel.set_title(title, y=1.0)
         panel.set_xlabel(plane.labels[0])
         plane.shade(panel)
-        for look, cloud in zip((_FLOWN, _NOMINAL, _SWEPT), clouds, strict=False):
+        for look, cloud in zip(looks, clouds, strict=True):
             panel.plot(*cloud.T, **look, scalex=False, scaley=False)
     axes[0, 0].set_ylabel(plane.labels[1])
     axes[0, 0].yaxis.set_label_coords(-0.12, 0.5)  # the tall root sign of a pole's label would leave the sheet
     plane.name(axes[0, 0], clouds)
-    _number(axes[0, 1], clouds)
-    _legend(figure, block, plane, clouds)
+    _number(axes[0, 1], clouds[0], clouds[2] if swept else None, clouds[-1] if beside is not None else None)
+    _legend(figure, block, plane, clouds[0], swept)
     return figure
 
 
@@ -178,31 +205,36 @@ def _limit(panel: Axes, points: FloatArray, room: float) -> None:
     panel.set(xlim=(x0, x1), ylim=(y0, y1))
 
 
-def _number(panel: Axes, clouds: list[FloatArray]) -> None:
+def _number(panel: Axes, flown: FloatArray, swept: FloatArray | None, beside: FloatArray | None) -> None:
     """Numbers beside the cases; a line to the swept reading of the same case."""
-    flown = clouds[0]
     known = np.isfinite(flown).all(axis=1)
     lines = np.zeros((0, 4))
-    if len(clouds) > 2:
-        both = known & np.isfinite(clouds[2]).all(axis=1)
-        lines = np.column_stack([flown[both], clouds[2][both]])
+    if swept is not None:
+        both = known & np.isfinite(swept).all(axis=1)
+        lines = np.column_stack([flown[both], swept[both]])
         for x0, y0, x1, y1 in lines:
             panel.plot([x0, x1], [y0, y1], color=style.BLUE, linewidth=0.5, zorder=3, scalex=False, scaley=False)
-    texts = [str(i + 1) for i in np.flatnonzero(known)]
-    label_points(panel, flown[known, 0], flown[known, 1], texts, lines=lines, size=9.0)
+    points = [flown] if beside is None else [flown, beside]
+    texts = [str(i + 1) for cloud in points for i in np.flatnonzero(np.isfinite(cloud).all(axis=1))]
+    shown = np.vstack([cloud[np.isfinite(cloud).all(axis=1)] for cloud in points])
+    label_points(panel, shown[:, 0], shown[:, 1], texts, lines=lines, size=9.0)
 
 
-def _legend(figure: Figure, block: Mapping[str, Any], plane: Plane, clouds: list[FloatArray]) -> None:
-    swept = len(clouds) > 2
+def _legend(figure: Figure, block: Mapping[str, Any], plane: Plane, flown: FloatArray, swept: bool) -> None:
     handles = [Line2D([], [], **_FLOWN, label="case, linear response" if swept else "case")]
     if swept:
         handles.append(Line2D([], [], **_SWEPT, label=f"case, swept with {block['amplitude']:g} m/s"))
+    if "beside" in block:
+        handles.append(Line2D([], [], **_BESIDE, label=f"case, {block['beside']['name']}"))
     handles.append(Line2D([], [], **_NOMINAL, label="nominal vehicle of the study"))
     for sure in sorted(set(plane.confirmed), reverse=True):
         text = "boundary, confirmed" if sure else "boundary, unverified"
         handles.append(Line2D([], [], **regions.boundary_style(sure), label=text))
     style.key(figure, handles, columns=4)
-    lost = [str(i + 1) for i, point in enumerate(clouds[0]) if not np.isfinite(point).all()]
+    lost = [str(i + 1) for i, point in enumerate(flown) if not np.isfinite(point).all()]
+    if "beside" in block:
+        placed = plane.place(block["beside"]["values"], "")
+        lost += [f"{i + 1} ({block['beside']['name']})" for i, point in enumerate(placed) if not np.isfinite(point).all()]
     missing = [f"Undefined and not drawn: case {', '.join(lost)}."] if lost else []
     rate = ["The Levels are those of the reading on attitude, shown behind this one for comparison only."] if swept else []
     style.note(figure, [*missing, *rate, " ".join(CAVEAT)])
