@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import math
-import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -166,10 +165,7 @@ def section(results: Results, name: str) -> Walk:
     """One section as the page has it, without pictures."""
     module, key = SECTIONS[name]
     environment = page.environment()
-    source = environment.loader.get_source(environment, "report.html")[0]
-    macro = re.search(r"\{% macro table.*?endmacro %\}", source, re.DOTALL)
-    assert macro
-    made = environment.from_string(macro[0] + f'{{% include "{name}.html" %}}')
+    made = environment.from_string('{% from "macros.html" import table %}' + f'{{% include "{name}.html" %}}')
     walk = Walk(made.render({name: module.context(results), "drawings": {key: []}}))
     assert walk.open == []
     return walk

@@ -20,7 +20,8 @@ from levelone._version import __version__
 from levelone.aerodynamics.coefficients import NAMES
 from levelone.aerodynamics.derivatives import Static, dynamic, static
 from levelone.aerodynamics.geometry import Geometry
-from levelone.config.geometry_file import PathOrName, load_geometry
+from levelone.config.files import PathOrName
+from levelone.config.geometry_file import load_geometry
 from levelone.config.other_codes import OtherCode
 from levelone.config.table_writer import ZERO, Coefficient, CoefficientTable, provenance
 from levelone.config.units import to_si

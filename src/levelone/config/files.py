@@ -5,10 +5,30 @@ from __future__ import annotations
 import hashlib
 import tomllib
 from collections.abc import Iterable
+from importlib import resources
+from os import PathLike
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
-from levelone.errors import InputError
+from levelone.errors import InputError, unknown_name
+
+PathOrName = str | PathLike[str]
+
+
+def shipped(package: str) -> dict[str, Path]:
+    """Files of a package's library: name and path."""
+    folder = Path(str(resources.files(package).joinpath("library")))
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def path_of(path_or_name: PathOrName, known: dict[str, Path], field: str) -> Path:
+    """File of the library by its name, or the user's own by its path (which ends in .toml); InputError with the closest name."""
+    text = str(path_or_name)
+    if text in known:
+        return known[text]
+    if not text.endswith(".toml"):
+        raise unknown_name(field, text, [*known, "PATH.toml"])
+    return Path(text)
 
 
 def read_bytes(path: Path, field: str) -> bytes:

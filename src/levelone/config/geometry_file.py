@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from importlib import resources
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from levelone.aerodynamics.geometry import Geometry, Surface
 from levelone.aerodynamics.geometry import Point as PointValue
 from levelone.aerodynamics.intersect import check_intersections
-from levelone.config.files import read_toml
+from levelone.config.files import PathOrName, path_of, read_toml, shipped
 from levelone.config.geometry_schema import GeometryFile, Number, Reference, SurfaceEntry
 from levelone.config.quantities import origins
 from levelone.config.schema import check, in_file, in_section
-from levelone.errors import InputError, unknown_name
-
-PathOrName = str | PathLike[str]
+from levelone.errors import InputError
 
 
 def geometries() -> dict[str, Path]:
     """Geometries that ship with the package: name and file."""
-    folder = Path(str(resources.files("levelone.aerodynamics").joinpath("library")))
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    return shipped("levelone.aerodynamics")
 
 
 def geometry_path(path_or_name: PathOrName) -> Path:
@@ -33,13 +28,7 @@ def geometry_path(path_or_name: PathOrName) -> Path:
     InputError
         Neither a known name nor a path; the closest name is in the text.
     """
-    text = str(path_or_name)
-    shipped = geometries()
-    if text in shipped:
-        return shipped[text]
-    if not text.endswith(".toml"):
-        raise unknown_name("geometry", text, [*shipped, "PATH.toml"])
-    return Path(text)
+    return path_of(path_or_name, geometries(), "geometry")
 
 
 def load_geometry(path_or_name: PathOrName) -> Geometry:

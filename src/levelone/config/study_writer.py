@@ -15,8 +15,8 @@ import tomlkit
 
 from levelone.aerodynamics.derivatives import Derivatives
 from levelone.config.extends import ORIGIN, read_study
-from levelone.config.files import read_text
-from levelone.config.geometry_file import PathOrName, load_geometry
+from levelone.config.files import PathOrName, read_text
+from levelone.config.geometry_file import load_geometry
 from levelone.config.study_file import Study, load_study
 from levelone.config.study_schema import PARAMETERS
 from levelone.config.table_writer import ZERO, provenance, write_checked

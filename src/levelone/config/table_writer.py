@@ -13,8 +13,8 @@ import tomlkit
 
 from levelone._version import __version__
 from levelone.aerodynamics.geometry import Geometry
-from levelone.config.files import file_hash, read_text, read_toml
-from levelone.config.geometry_file import PathOrName, geometry_path
+from levelone.config.files import PathOrName, file_hash, read_text, read_toml
+from levelone.config.geometry_file import geometry_path
 from levelone.config.vehicle_file import load_vehicle
 from levelone.errors import InputError
 from levelone.vehicle import COEFFICIENTS, TARGET_UNITS

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib import resources
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from levelone.config.changes import Change, changed
-from levelone.config.files import beside, file_hash, joint_hash, read_toml
+from levelone.config.files import PathOrName, beside, file_hash, joint_hash, path_of, read_toml, shipped
 from levelone.config.quantities import Quantity, origins
 from levelone.config.rotor_csv import read_rotor_table
 from levelone.config.schema import check, in_file, in_section
@@ -25,7 +23,7 @@ from levelone.config.vehicle_schema import (
     VehicleFile,
     VelocityLoop,
 )
-from levelone.errors import InputError, unknown_name
+from levelone.errors import InputError
 from levelone.vehicle import (
     COEFFICIENTS,
     PID,
@@ -43,13 +41,10 @@ from levelone.vehicle import (
     Vehicle,
 )
 
-PathOrName = str | PathLike[str]
-
 
 def library() -> dict[str, Path]:
     """Vehicles that ship with the package: name and file."""
-    folder = Path(str(resources.files("levelone.vehicle").joinpath("library")))
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    return shipped("levelone.vehicle")
 
 
 def vehicle_path(path_or_name: PathOrName) -> Path:
@@ -60,13 +55,7 @@ def vehicle_path(path_or_name: PathOrName) -> Path:
     InputError
         Neither a known name nor a path; the closest name is in the text.
     """
-    text = str(path_or_name)
-    shipped = library()
-    if text in shipped:
-        return shipped[text]
-    if not text.endswith(".toml"):
-        raise unknown_name("vehicle", text, [*shipped, "PATH.toml"])
-    return Path(text)
+    return path_of(path_or_name, library(), "vehicle")
 
 
 def load_vehicle(path_or_name: PathOrName, changes: Mapping[str, Change] | None = None) -> Vehicle:
