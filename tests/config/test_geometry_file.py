@@ -3,6 +3,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +53,7 @@ def geometry_file(tmp_path):
 def test_the_shipped_geometries_hold_what_the_study_prints():
     wing, pair, whole = (load_geometry(name) for name in ("reference-wing", "reference-wing-tail", "reference-evtol"))
     assert pair.surfaces[0] == wing.surfaces[0]
-    assert whole.surfaces[1] == pair.surfaces[1]
+    assert replace(whole.surfaces[1], strips=4) == pair.surfaces[1]
     for geometry in (wing, pair, whole):
         assert (geometry.area, geometry.chord, geometry.span) == (0.78, PRINTED["chord"], PRINTED["span"])
         assert geometry.reference_point == (0.0, 0.0, 0.0)
@@ -78,7 +79,7 @@ def test_the_shipped_geometries_hold_what_the_study_prints():
 def test_panels_of_wing_and_tail_are_equally_long():
     wing, tail, plate = load_geometry("reference-evtol").surfaces
     assert {surface.root_chord / surface.chordwise for surface in (wing, tail, plate)} == {0.0325}
-    assert [(surface.chordwise, surface.strips) for surface in (wing, tail, plate)] == [(8, 10), (4, 4), (4, 4)]
+    assert [(surface.chordwise, surface.strips) for surface in (wing, tail, plate)] == [(8, 15), (4, 6), (4, 8)]
 
 
 def test_end_plates_stand_on_the_tips_of_the_tail():
