@@ -31,7 +31,7 @@ def derivatives(
     speed: Annotated[str, typer.Option(help="Airspeeds, m/s: 6,8 or FIRST:LAST:COUNT.")] = "6",
     axis: Annotated[AxisName, typer.Option(help="Pitch, heave and rate; or sideslip, roll, yaw and yaw_rate.")] = "longitudinal",
     method: Annotated[
-        Method, typer.Option(help="frequency: linear, exact in the wake. time: a march with a free wake.")
+        Method, typer.Option(help="frequency: linear, exact in the wake. time: a march in time, slow.")
     ] = "frequency",
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the derivatives as CSV.")] = None,
     table: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the [aerodynamics] section of a vehicle file.")] = None,
