@@ -70,6 +70,8 @@ def test_what_is_printed(small):
         (["--k", "9"], "too high for panels"),
         (["--speed", "0"], "--speed: 0 m/s is no airspeed"),
         (["--out", "/no/such/folder/x.csv"], "--out: cannot write"),
+        (["--omega", "3"], "--omega: belongs to --table"),
+        (["--method", "time", "--study", "x.toml"], "--study: takes the frequency domain"),
     ],
 )
 def test_bad_input_ends_in_one_line(small, words, problem):
@@ -107,6 +109,12 @@ def test_another_codes_file_needs_no_lattice(tmp_path):
     missing = call(tmp_path / "no.st", "--table", tmp_path / "t.toml")
     assert missing.exit_code == 2
     assert "no.st" in missing.output
+
+
+def test_what_another_codes_file_cannot_give_is_refused(tmp_path):
+    done = call("some.stab", "--out", tmp_path / "x.csv")
+    assert done.exit_code == 2
+    assert "--out: an AVL or VSPAERO file gives a --table only" in done.output
 
 
 def test_the_page(small, tmp_path):

@@ -73,7 +73,9 @@ def _one(lattice: Lattice, motion: str, k: float, speed: float, cut: float, thre
     if history.outcome.failed:
         return np.full((2, len(NAMES)), np.nan), history.words
     reference = Reference(lattice.area, lattice.chord, lattice.span)
-    values = history.in_wind_axes(reference, 0.5 * 1.225 * speed**2)
+    # lift and drag against the wind, as alpha turns it; side force and moments along the body, which rolls and yaws
+    axes = history.in_body_axes if motion in LATERAL else history.in_wind_axes
+    values = axes(reference, 0.5 * 1.225 * speed**2)
     fits = [derivative(harmonic(history.time, column, omega), AMPLITUDE, k) for column in values.T]
     size = np.max(np.abs(values), axis=0)
     quiet = size < 1e-9 * np.max(size)
