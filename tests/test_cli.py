@@ -18,7 +18,19 @@ from levelone.console import numbers, stage_bars
 from levelone.errors import InputError
 
 STUDY = Path(__file__).parents[1] / "studies" / "reference" / "study.toml"
-COMMANDS = ("run", "compare", "experiments", "calibrate", "report", "trim", "simulate", "linearize", "derivatives")
+COMMANDS = (
+    "run",
+    "compare",
+    "decompose",
+    "experiments",
+    "calibrate",
+    "report",
+    "trim",
+    "simulate",
+    "linearize",
+    "derivatives",
+    "dakota",
+)
 
 
 def call(*arguments):
@@ -308,7 +320,16 @@ def test_help_tells_a_newcomer_what_to_do_next():
     done = subprocess.run([sys.executable, "-m", "levelone.cli", "--help"], capture_output=True, text=True, check=True)
     shown = [line.split() for line in done.stdout.splitlines()]
     examples = [words for words in shown if words[:1] == ["levelone"]]
-    assert {words[1] for words in examples} == {"trim", "simulate", "linearize", "run", "compare", "calibrate", "derivatives"}
+    assert {words[1] for words in examples} == {
+        "trim",
+        "simulate",
+        "linearize",
+        "run",
+        "compare",
+        "decompose",
+        "calibrate",
+        "derivatives",
+    }
     assert set(COMMANDS) <= {words[0] for words in shown if words}
     folder = next(words[0] for words in shown if words and words[0].endswith("library"))
     assert (Path(folder) / "reference-evtol.toml").is_file()

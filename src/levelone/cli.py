@@ -18,6 +18,8 @@ from levelone.console import (
     stage_bars,
     write_csv,
 )
+from levelone.dakota_command import dakota_app
+from levelone.decompose_command import decompose
 from levelone.derivatives_command import derivatives
 
 EPILOG = f"""\b
@@ -27,6 +29,7 @@ What to do next:
   levelone linearize reference-evtol --speed 5    poles of the closed loop
   levelone run studies/reference/study.toml       the whole study: a few minutes, ends with report.html
   levelone compare results/reference              the published findings, decided on that run
+  levelone decompose studies/reference/study.toml the indices of the model itself, without a surrogate
   levelone calibrate studies/reference/calibration.toml   how the unpublished numbers were found
   levelone derivatives reference-wing-tail        aerodynamic derivatives of a geometry, against reduced frequency
 
@@ -236,7 +239,9 @@ def linearize(
             show(f"Poles of {aircraft.name} at {speed:g} m/s, {mode} mode", columns.pole_table(model, command, output))
 
 
+app.command()(decompose)
 app.command()(derivatives)
+app.add_typer(dakota_app, name="dakota")
 
 
 def main() -> None:

@@ -99,7 +99,8 @@ def test_the_command_page_names_every_command_and_option():
     for name, command in typer.main.get_command(app).commands.items():
         section = PAGES["command"].partition(f"## levelone {name} ")[2].partition("\n## ")[0]
         assert section, name
-        missing += [
-            option for parameter in command.params for option in parameter.opts if option.startswith("--") and option not in section
-        ]
+        parts = getattr(command, "commands", {"": command})
+        missing += [part for part in parts if f"levelone {name} {part}" not in section and part]
+        options = [option for part in parts.values() for parameter in part.params for option in parameter.opts]
+        missing += [option for option in options if option.startswith("--") and option not in section]
     assert missing == []

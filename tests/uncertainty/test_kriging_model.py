@@ -257,7 +257,10 @@ def test_the_limit_of_the_blas_is_set_and_restored_once_by_the_first_thread_afte
         def __init__(self, limits, user_api):
             events.append(("set", limits, threading.current_thread().name))
 
-        def restore_original_limits(self):
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
             events.append(("restore", threading.current_thread().name))
 
     def first():

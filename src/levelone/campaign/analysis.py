@@ -41,12 +41,19 @@ LEVEL_KEYS = {
 }
 
 
+#: why a study of correlated factors has neither Morris nor Sobol indices
+CORRELATED = (
+    "refused: the factors are correlated, so that shares of first and total order no longer add up and none can be moved alone; "
+    "Shapley effects and first-order indices of the runs stand in their place"
+)
+
+
 @dataclass(frozen=True)
 class Decomposition:
     """Surrogates of every response and the Sobol indices found on them; ``bounded`` holds those with failures filled in."""
 
     surrogates: tuple[Kriging, ...]
-    indices: tuple[SobolIndices, ...]
+    indices: tuple[SobolIndices | None, ...]
     bounded: Mapping[str, tuple[SobolIndices, SobolIndices]]
 
 
@@ -64,7 +71,7 @@ def screen_one(design: Design, values: FloatArray, policy: str, bootstrap: int) 
 def decompose(
     sample: Design,
     assessed: Assessment,
-    base: Design,
+    base: Design | None,
     policy: str,
     seed: int,
     bootstrap: int,
@@ -72,10 +79,13 @@ def decompose(
     workers: int | None,
     progress: Callable[[str, int, int], None],
 ) -> Decomposition:
-    """Kriging of each response on the sample, and Sobol indices of each surrogate on the pick-freeze design ``base``."""
+    """Kriging of each response on the sample, and Sobol indices of each surrogate on the pick-freeze design ``base``.
+
+    Correlated factors have no such design: surrogates only, None for every index.
+    """
     names, values = assessed.responses.names, assessed.responses.values
     columns, owners = [values], list(names)
-    if policy == "bound":
+    if policy == "bound" and base is not None:
         for name in names:
             y = assessed.responses.column(name)
             if np.isnan(y).any() and np.isfinite(y).any():
@@ -89,6 +99,8 @@ def decompose(
         progress("surrogates", done[0], total)
 
     models = fit_all(sample.points, y, seed, workers=workers, policy="drop", progress=fitted, **options)
+    if base is None:
+        return Decomposition(models, (None,) * total, {})
     indices = []
     for i, predicted in enumerate(predict_all(models, base.points, workers=workers).T):
         indices.append(sobol(base, predicted, bootstrap=bootstrap, policy="drop"))
@@ -146,9 +158,14 @@ def morris_json(space: FactorSpace, found: MorrisIndices | None) -> Json:
     }  # fmt: skip
 
 
-def sobol_json(space: FactorSpace, found: SobolIndices, intervals: bool = True) -> Json:
-    """Sobol indices by factor."""
+def sobol_json(space: FactorSpace, found: SobolIndices | None, intervals: bool = True) -> Json:
+    """Sobol indices by factor; NaN where correlated factors have none."""
     out: Json = {}
+    if found is None:
+        nan = float("nan")
+        return {
+            name: {"S1": nan, "ST": nan} | ({"S1_ci": [nan, nan], "ST_ci": [nan, nan]} if intervals else {}) for name in space.names
+        }
     for j, name in enumerate(space.names):
         out[name] = {"S1": float(found.S1[j]), "ST": float(found.ST[j])}
         if intervals:
@@ -165,9 +182,9 @@ def surrogate_json(space: FactorSpace, model: Kriging) -> Json:
     }  # fmt: skip
 
 
-def agreement(screened: MorrisIndices | None, found: SobolIndices) -> float:
+def agreement(screened: MorrisIndices | None, found: SobolIndices | None) -> float:
     """Rank correlation of mu_star with ST; NaN where either is missing."""
-    return float("nan") if screened is None else rank_agreement(screened.mu_star, found.ST)
+    return float("nan") if screened is None or found is None else rank_agreement(screened.mu_star, found.ST)
 
 
 def level_shares(assessed: Assessment) -> Json:

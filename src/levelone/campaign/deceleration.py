@@ -113,7 +113,8 @@ def _decompose(
         tuple(names),
         tuple(MEASURES[name] for _ in flown for name in DECOMPOSED),
     )
-    base = sobol_design(study.space, min(BASE_POINTS, study.method.base_points), stage_seed(seed, "deceleration sobol"))
+    points = min(BASE_POINTS, study.method.base_points)
+    base = None if study.space.correlated else sobol_design(study.space, points, stage_seed(seed, "deceleration sobol"))
     options = {"correlation": KERNEL, "trend": study.method.trend, "starts": STARTS}
     assessed = Assessment(joined, {}, np.zeros(len(joined), dtype=np.int64), {})
     fit_seed, bootstrap = stage_seed(seed, "deceleration surrogates"), study.method.bootstrap

@@ -26,6 +26,9 @@ def describe_study(study: Study, seed: int) -> dict[str, Any]:
         "notes": list(study.notes),
         "seed": seed,
         "factors": [_factor(study, j) for j in range(len(study.space.factors))],
+        "correlations": [
+            {"factors": [first, second], "rank": rank, "source": why} for first, second, rank, why in study.correlations
+        ],
         "method": {
             "trajectories": m.trajectories, "levels": m.levels, "samples": m.samples, "base_points": m.base_points,
             "kernel": m.kernel, "trend": m.trend, "bootstrap": m.bootstrap,

@@ -103,8 +103,9 @@ def evaluate(study: Study, seed: int, threads: int | None = None, progress: Prog
     model = build_model(study, threads)
     sampled = sample_study(study, model, model.nominal(), seed, threads, progress, Clock(), RANKED)
     summary = {"study": describe_study(study, seed), "responses": response_results(study, sampled)}
-    asked = replace(study, amplitudes=(min(study.amplitudes),) if study.amplitudes else (), froude=None, deceleration=None)
-    sections = run_sections(asked, model, sampled.sample, sampled.assessed, seed, progress).results
+    amplitudes = (min(study.amplitudes),) if study.amplitudes else ()
+    asked = replace(study, amplitudes=amplitudes, froude=None, deceleration=None, epistemic=None)
+    sections = run_sections(asked, model, sampled, seed, progress).results
     sections["sweep"] = sweep_check(model, study.sweep, study.windows).summary()
     return assessed_evidence(summary | sections, sampled.sample, sampled.assessed)
 

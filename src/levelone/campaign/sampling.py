@@ -35,11 +35,14 @@ class Clock:
 
 @dataclass(frozen=True)
 class Sampled:
-    """The nominal assessment, the two designs with theirs, and the decomposition of ``read``, the responses it was asked for."""
+    """The nominal assessment, the two designs with theirs, and the decomposition of ``read``, the responses it was asked for.
+
+    There is no screening of correlated factors, which cannot be moved one by one.
+    """
 
     nominal: Assessment
-    screening: Design
-    screened: Assessment
+    screening: Design | None
+    screened: Assessment | None
     sample: Design
     assessed: Assessment
     read: Assessment
@@ -58,15 +61,17 @@ def sample_study(
 ) -> Sampled:
     """Screen, sample and decompose; ``names`` are the responses that get surrogates and indices."""
     method = study.method
-    with clock.stage("morris"):
-        screening = morris_design(study.space, method.trajectories, method.levels, stage_seed(seed, "morris"))
-        screened = _assess(model, screening, "screening (Morris)", progress)
+    screening = screened = None
+    if not study.space.correlated:
+        with clock.stage("morris"):
+            screening = morris_design(study.space, method.trajectories, method.levels, stage_seed(seed, "morris"))
+            screened = _assess(model, screening, "screening (Morris)", progress)
     with clock.stage("monte_carlo"):
         sample = latin_hypercube(study.space, method.samples, stage_seed(seed, "monte carlo"))
         assessed = _assess(model, sample, "Monte Carlo", progress)
     read = _only(assessed, names)
     with clock.stage("decomposition"):
-        base = sobol_design(study.space, method.base_points, stage_seed(seed, "sobol"))
+        base = None if study.space.correlated else sobol_design(study.space, method.base_points, stage_seed(seed, "sobol"))
         options = {"correlation": method.kernel, "trend": method.trend}
         found = analysis.decompose(
             sample, read, base, study.policy, stage_seed(seed, "surrogates"), method.bootstrap, options, threads, progress
@@ -89,7 +94,9 @@ def _only(assessed: Assessment, names: tuple[str, ...]) -> Assessment:
 
 def response_results(study: Study, s: Sampled) -> dict[str, Any]:
     """The block of each response in results.json, for those that were decomposed."""
-    effects = analysis.screen(s.screening, s.screened, study.policy, study.method.bootstrap)
+    effects = dict.fromkeys(s.read.responses.names)
+    if s.screening is not None and s.screened is not None:
+        effects |= analysis.screen(s.screening, s.screened, study.policy, study.method.bootstrap)
     out: dict[str, Any] = {}
     for j, name in enumerate(s.read.responses.names):
         unit, criterion = RESPONSES[name]
@@ -100,7 +107,7 @@ def response_results(study: Study, s: Sampled) -> dict[str, Any]:
             "nominal": float(s.nominal.responses.column(name)[0]),
             "status": Status(int(s.nominal.responses.codes(name)[0])).text,
             "morris": analysis.morris_json(study.space, effects[name]),
-            "morris_failed": int(s.screened.responses.failed(name).sum()),
+            "morris_failed": 0 if s.screened is None else int(s.screened.responses.failed(name).sum()),
             "morris_unit": f"{unit} per full factor range",
             "monte_carlo": analysis.statistics(s.read.responses.column(name)),
             "failures": failures,
@@ -110,6 +117,8 @@ def response_results(study: Study, s: Sampled) -> dict[str, Any]:
             "sobol": analysis.sobol_json(study.space, s.found.indices[j]),
             "rank_agreement": analysis.agreement(effects[name], s.found.indices[j]),
         }
+        if study.space.correlated:
+            block["surrogate"]["status"] = analysis.CORRELATED
         if study.policy == "refuse" and failures:
             nan = {"S1": np.nan, "ST": np.nan, "S1_ci": [np.nan, np.nan], "ST_ci": [np.nan, np.nan]}
             block["sobol"] = {factor: dict(nan) for factor in study.space.names}

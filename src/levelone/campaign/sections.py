@@ -13,10 +13,11 @@ from levelone.campaign.cases import cases_section
 from levelone.campaign.coupling import coupling_section
 from levelone.campaign.deceleration import deceleration_section
 from levelone.campaign.delay import delay_section
+from levelone.campaign.epistemic import epistemic_section
 from levelone.campaign.froude import froude_section
-from levelone.campaign.models import Assessment, BuiltinModel
+from levelone.campaign.models import BuiltinModel
+from levelone.campaign.sampling import Sampled
 from levelone.config.study_file import Study
-from levelone.uncertainty import Design
 
 Progress = Callable[[str, int, int], None]
 
@@ -30,22 +31,21 @@ class Sections:
     files: Mapping[str, Mapping[str, xr.Dataset]] = field(default_factory=dict)
 
 
-def run_sections(
-    study: Study, model: BuiltinModel, sample: Design, assessed: Assessment, seed: int, progress: Progress
-) -> Sections:
+def run_sections(study: Study, model: BuiltinModel, sampled: Sampled, seed: int, progress: Progress) -> Sections:
     """Run every further section that a study's file has.
 
     Parameters
     ----------
     study, model
         The study and the vehicle under its manoeuvres.
-    sample, assessed
-        The Monte Carlo sample, and what was read there.
+    sampled
+        The Monte Carlo sample, what was read there, and the surrogates of it.
     seed
         Of the study.
     progress
         Called with the stage's name, what is done and what there is to do.
     """
+    sample, assessed = sampled.sample, sampled.assessed
     out: dict[str, Any] = {"without_delay": delay_section(study, model, sample)}
     frequency: dict[str, xr.Dataset] = {}
     files: dict[str, dict[str, xr.Dataset]] = {}
@@ -59,4 +59,7 @@ def run_sections(
         out["coupling"] = coupling_section(study, model, seed, progress)
     if study.deceleration is not None:
         out["deceleration"], files = deceleration_section(study, model, sample, assessed, seed, progress)
+    if study.epistemic is not None:
+        surrogates = dict(zip(sampled.read.responses.names, sampled.found.surrogates, strict=True))
+        out["epistemic"] = epistemic_section(study, model, assessed, surrogates, seed, progress)
     return Sections(out, frequency, files)

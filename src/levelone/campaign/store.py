@@ -117,6 +117,13 @@ def history_dataset(history: TimeHistory, names: tuple[str, ...], attrs: Mapping
     return out
 
 
+def write_dataset(path: Path, data: xr.Dataset) -> None:
+    """A dataset as one NetCDF file, in one move: no half-written file is ever seen."""
+    part = path.with_suffix(".part")
+    data.to_netcdf(part, engine=ENGINE, encoding=dict.fromkeys(data.data_vars, COMPRESSED))
+    os.replace(part, path)
+
+
 def write_groups(path: Path, groups: Mapping[str, xr.Dataset]) -> None:
     """Several datasets as groups of one NetCDF file."""
     part = path.with_suffix(".part")

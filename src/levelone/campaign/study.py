@@ -11,11 +11,13 @@ from levelone.campaign import analysis
 from levelone.campaign.checks import confidences, numerics, provenance, validity
 from levelone.campaign.compare import take_along
 from levelone.campaign.describe import describe_study
+from levelone.campaign.measures import measures_section
 from levelone.campaign.models import BuiltinModel
 from levelone.campaign.pictures import frequency_groups, history_groups
 from levelone.campaign.sampling import Clock, Progress, Sampled, response_results, sample_study
 from levelone.campaign.sections import Sections, run_sections
-from levelone.campaign.store import prepare_folder, write_groups, write_json, write_sample
+from levelone.campaign.store import prepare_folder, write_dataset, write_groups, write_json, write_sample
+from levelone.campaign.surrogate_errors import residual_dataset, surrogate_errors, with_errors
 from levelone.campaign.sweep import SweepCheck, sweep_check
 from levelone.config.study_file import Study
 from levelone.dynamics import trim
@@ -81,8 +83,12 @@ def run_study(
         swept = sweep_check(model, study.sweep, study.windows)
         progress("nominal flight", 2, 2)
     sampled = sample_study(study, model, nominal, seed, threads, progress, clock)
+    with clock.stage("errors"):
+        errors = surrogate_errors(study, sampled, seed, threads, progress)
+    with clock.stage("measures"):
+        measures = measures_section(sampled, seed, threads, progress)
     with clock.stage("sections"):
-        sections = run_sections(study, model, sampled.sample, sampled.assessed, seed, progress)
+        sections = run_sections(study, model, sampled, seed, progress)
     with clock.stage("numerics"):
         progress("numerics", 0, 1)
         checks = numerics(study, model, nominal, swept)
@@ -92,7 +98,8 @@ def run_study(
     results: dict[str, Any] = {
         "schema": SCHEMA,
         "study": describe_study(study, seed),
-        "responses": response_results(study, sampled),
+        "responses": {name: with_errors(block, errors[name]) for name, block in response_results(study, sampled).items()},
+        "measures": measures,
         "levels": analysis.level_shares(sampled.assessed) | {"confidence": confidences(study)},
         "nominal": nominal_results(model, swept),
         "numerics": checks,
@@ -110,9 +117,11 @@ def run_study(
 
 
 def _write_files(folder: Path, model: BuiltinModel, sampled: Sampled, swept: SweepCheck, sections: Sections) -> None:
-    write_sample(folder, "morris", sampled.screening, sampled.screened)
+    if sampled.screening is not None and sampled.screened is not None:
+        write_sample(folder, "morris", sampled.screening, sampled.screened)
     write_sample(folder, "monte_carlo", sampled.sample, sampled.assessed)
     write_groups(folder / "histories.nc", history_groups(model, sampled.sample, swept))
+    write_dataset(folder / "surrogates.nc", residual_dataset(sampled))
     write_groups(folder / "frequency.nc", frequency_groups(swept) | dict(sections.frequency))
     for name, groups in sections.files.items():
         write_groups(folder / name, groups)

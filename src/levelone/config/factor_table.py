@@ -15,8 +15,11 @@ from levelone.errors import InputError, unknown_name
 from levelone.handling.history import FloatArray
 from levelone.handling.manoeuvres import Manoeuvre
 from levelone.uncertainty import DISTRIBUTIONS, Distribution, Factor, FactorSpace, uniform_around
+from levelone.uncertainty.distributions import Interval
 from levelone.vehicle import TARGET_UNITS, TARGETS, Vehicle, nominal_value, vary
 
+#: distributions that a file gives as a range about the nominal value
+AS_RANGE = ("uniform", "interval")
 #: relative difference at which a study's value no longer counts as that of its vehicle
 SAME_VALUE = 1e-9
 
@@ -127,7 +130,8 @@ def _distribution(table: FactorTable, value: float, scale: float, path: str) -> 
     _check_keys(table, path)
     if table.range is not None and table.kind is not None:
         low, high = table.range if table.kind == "relative" else (scale * end for end in table.range)
-        return uniform_around(value, low, high, table.kind, field=f"{path}.range")
+        around = uniform_around(value, low, high, table.kind, field=f"{path}.range")
+        return Interval(around.low, around.high) if table.distribution == "interval" else around
     try:
         return made(**{name: _converted(name, given, scale) for name, given in table.parameters.items()})
     except InputError as error:
@@ -136,12 +140,13 @@ def _distribution(table: FactorTable, value: float, scale: float, path: str) -> 
 
 def _check_keys(table: FactorTable, path: str) -> None:
     """Refuse a parameter that is missing or belongs to another distribution."""
-    if table.distribution == "uniform":
+    if table.distribution in AS_RANGE:
         required, optional = ["range", "kind"], []
     else:
         items = fields(DISTRIBUTIONS[table.distribution])
         required, optional = [f.name for f in items if f.default is MISSING], [f.name for f in items if f.default is not MISSING]
-    takes = f"a {table.distribution} distribution takes {', '.join(required + optional)}"
+    article = "an" if table.distribution[0] in "aei" else "a"
+    takes = f"{article} {table.distribution} distribution takes {', '.join(required + optional)}"
     for name in table.parameters:
         if name not in required + optional:
             raise InputError(f"{path}.{name}", f"has no place here: {takes}")
@@ -151,9 +156,11 @@ def _check_keys(table: FactorTable, path: str) -> None:
 
 
 def _converted(name: str, given: Any, scale: float) -> Any:
-    """A parameter in the unit of the target; ``mu`` is a mean of logarithms, ``sigma`` and ``weights`` have no unit."""
+    """A parameter in the unit of the target; ``mu`` is a mean of logarithms, ``sigma``, ``weights`` and ``masses`` have no unit."""
     if name == "mu":
         return given + math.log(scale)
-    if name in ("sigma", "weights"):
+    if name == "intervals":
+        return tuple((scale * low, scale * high) for low, high in given)
+    if name in ("sigma", "weights", "masses"):
         return tuple(given) if isinstance(given, list) else given
     return tuple(scale * each for each in given) if isinstance(given, list) else scale * given

@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from levelone.config.correlation_table import correlated, described
 from levelone.config.deceleration_table import deceleration_of
+from levelone.config.epistemic_table import Epistemic, epistemic_of
 from levelone.config.extends import StudySource, read_study
 from levelone.config.factor_table import check_corners, inputs_of
 from levelone.config.manoeuvres import manoeuvre
@@ -84,6 +86,8 @@ class Study:
         [nf] rad/s: frequencies of the linear response.
     space, targets, nominal
         Factors in the unit of what they set; their targets (names in ``levelone.vehicle.TARGETS``) and [factors] nominal values.
+    correlations
+        Both factors, rank correlation and origin in words of each correlated pair.
     method
         Sizes and options of the analysis.
     boundaries, boundaries_source, task
@@ -92,7 +96,7 @@ class Study:
         Statements that the report repeats.
     findings
         File of claims that results are compared with; None where there is none.
-    coupling, cases, froude, deceleration
+    coupling, cases, froude, deceleration, epistemic
         What is done beside screening, Monte Carlo and decomposition; None or empty where it is not asked for.
     amplitudes
         m/s: sweeps that are compared with the linear response.
@@ -120,6 +124,7 @@ class Study:
     space: FactorSpace
     targets: tuple[str, ...]
     nominal: FloatArray
+    correlations: tuple[tuple[str, str, float, str], ...]
     method: Method
     boundaries: Boundaries
     boundaries_source: str
@@ -133,6 +138,7 @@ class Study:
     amplitudes: tuple[float, ...]
     froude: Froude | None
     deceleration: Deceleration | None
+    epistemic: Epistemic | None
     assumed: tuple[tuple[str, str], ...]
 
 
@@ -166,6 +172,7 @@ def _study(content: StudyFile, source: StudySource, vehicle: Vehicle, where: Pat
     inputs = inputs_of(factors, vehicle, condition.trim_speed)
     paths = [path for path, _ in factors]
     check_corners(inputs, paths, vehicle, (quickness, stability, swept))
+    inputs = correlated(inputs, content.correlation, content.coupling)
     boundaries_source = _boundaries_source(content.levels.boundaries)
     boundaries = load_boundaries(boundaries_source)
     boundaries.chart("bandwidth", content.levels.task)
@@ -190,6 +197,7 @@ def _study(content: StudyFile, source: StudySource, vehicle: Vehicle, where: Pat
         space=inputs.space,
         targets=inputs.targets,
         nominal=inputs.nominal,
+        correlations=described(content.correlation),
         method=_method(content.method),
         boundaries=boundaries,
         boundaries_source=boundaries_source,
@@ -203,6 +211,7 @@ def _study(content: StudyFile, source: StudySource, vehicle: Vehicle, where: Pat
         amplitudes=amplitudes_of(content.manoeuvre.bandwidth.sweep.amplitudes),
         froude=froude_of(content.levels.froude),
         deceleration=deceleration_of(content.deceleration, inputs, paths, vehicle),
+        epistemic=epistemic_of(content.epistemic, inputs.space),
         assumed=assumed_of(content),
     )
 

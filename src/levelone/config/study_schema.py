@@ -168,6 +168,8 @@ class FactorTable(Origin):
     sigma: Finite | None = None
     values: list[Finite] | None = None
     weights: list[Finite] | None = None
+    intervals: list[Annotated[list[Finite], Field(min_length=2, max_length=2)]] | None = None
+    masses: list[Finite] | None = None
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -175,7 +177,16 @@ class FactorTable(Origin):
         return {name: value for name in PARAMETERS if (value := getattr(self, name)) is not None}
 
 
-PARAMETERS = ("kind", "range", "low", "high", "mean", "std", "centre", "mode", "mu", "sigma", "values", "weights")
+PARAMETERS = (
+    "kind", "range", "low", "high", "mean", "std", "centre", "mode", "mu", "sigma", "values", "weights", "intervals", "masses",
+)  # fmt: skip
+
+
+class CorrelationTable(Origin):
+    """[[correlation]]: Spearman rank correlation of two factors."""
+
+    factors: Annotated[Texts, Field(min_length=2, max_length=2)]
+    rank: Annotated[float, Field(gt=-1.0, lt=1.0)]
 
 
 class CouplingTable(Strict):
@@ -236,6 +247,14 @@ class DecelerationTable(Strict):
     adequate: ToleranceTable
 
 
+class EpistemicTable(Origin):
+    """[epistemic]: probability boxes over the factors that are only known as intervals."""
+
+    factors: Annotated[Texts, Field(min_length=1)] | None = None
+    outer: Count
+    inner: Count | None = None
+
+
 class StudyFile(Strict):
     """A whole study file."""
 
@@ -245,6 +264,8 @@ class StudyFile(Strict):
     method: MethodTable
     levels: LevelTable = LevelTable()
     factor: Annotated[list[FactorTable], Field(min_length=1)]
+    correlation: Annotated[list[CorrelationTable], Field(default_factory=list)]
     coupling: CouplingTable | None = None
     cases: Annotated[list[CasesTable], Field(default_factory=list)]
     deceleration: DecelerationTable | None = None
+    epistemic: EpistemicTable | None = None

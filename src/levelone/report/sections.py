@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from typing import Any
 
-from levelone.report import amplitudes, cases, comparison, coupling, deceleration, delay, froude, translation
+from levelone.report import (
+    amplitudes,
+    cases,
+    certainty,
+    comparison,
+    coupling,
+    deceleration,
+    delay,
+    direct,
+    epistemic,
+    froude,
+    translation,
+)
 from levelone.report.pictures import Picture
 from levelone.report.results import Results
 
@@ -17,6 +29,9 @@ SECTIONS: dict[str, tuple[Any, str, str]] = {
     "cases": (cases, "cases", "Cases"),
     "coupling": (coupling, "coupling", "Coupling"),
     "amplitudes": (amplitudes, "amplitudes", "Amplitudes"),
+    "certainty": (certainty, "certainty", "Trust in surrogates"),
+    "direct": (direct, "direct", "Indices of the model itself"),
+    "epistemic": (epistemic, "epistemic", "Unknown and varying"),
     "comparison": (comparison, "comparison", "Findings"),
 }
 

@@ -32,7 +32,7 @@ class OneBlasThread:
             with cls._condition:
                 if cls._owner is None:
                     cls._owner = threading.get_ident()
-                    cls._limits = threadpool_limits(limits=1, user_api="blas")
+                    cls._limits = threadpool_limits(limits=1, user_api="blas").__enter__()
                 cls._inside += 1
         return self
 
@@ -46,5 +46,6 @@ class OneBlasThread:
             cls._condition.notify_all()
             if cls._owner == threading.get_ident() and cls._limits is not None:
                 cls._condition.wait_for(lambda: cls._inside == 0)
-                cls._limits.restore_original_limits()
+                # not restore_original_limits(): that keeps this thread the only one which can ever set a limit again
+                cls._limits.__exit__(None, None, None)
                 cls._owner = cls._limits = None

@@ -1,18 +1,17 @@
 """Distributions of one uncertain input, each defined by its inverse distribution function.
 
 Every distribution is a frozen value with ``ppf(u)`` (array in, array out, increasing in u), ``mean`` and ``support``.
-Uniform stands for an interval about which nothing else is known: then the share of samples at a Level is a share of
-the interval, not a probability.
+A share of samples over an input that is only known as an interval is a share of that interval, not a probability:
+Interval and Evidence say so of an input, and are drawn from as uniform where a method needs a distribution.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
-from numbers import Real
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal, Protocol, runtime_checkable
+from typing import ClassVar, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +19,8 @@ from scipy.special import ndtri
 from scipy.stats import truncnorm
 
 from levelone.errors import InputError
+from levelone.uncertainty.evidence import Evidence
+from levelone.uncertainty.parameter_checks import check_increasing, check_numbers, check_positive, path
 
 FloatArray = NDArray[np.float64]
 
@@ -40,31 +41,6 @@ class Distribution(Protocol):
         """Inverse distribution function at probabilities ``u`` in [0, 1], any shape."""
 
 
-def _check_numbers(distribution: object) -> None:
-    """Refuse parameters that are not finite numbers, and store the rest as floats."""
-    for item in fields(distribution):  # type: ignore[arg-type]
-        value = getattr(distribution, item.name)
-        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-            raise InputError(_path(distribution, item.name), f"{value!r} is not a finite number")
-        object.__setattr__(distribution, item.name, float(value))
-
-
-def _check_increasing(distribution: object, low: str, high: str) -> None:
-    lower, upper = getattr(distribution, low), getattr(distribution, high)
-    if not lower < upper:
-        raise InputError(_path(distribution, high), f"range reversed or empty: {low} = {lower:g}, {high} = {upper:g}")
-
-
-def _check_positive(distribution: object, name: str) -> None:
-    value = getattr(distribution, name)
-    if value <= 0.0:
-        raise InputError(_path(distribution, name), f"{value:g} is not positive")
-
-
-def _path(distribution: object, name: str) -> str:
-    return f"{type(distribution).__name__}.{name}"
-
-
 @dataclass(frozen=True)
 class Uniform:
     """Every value between ``low`` and ``high`` equally likely."""
@@ -73,8 +49,8 @@ class Uniform:
     high: float
 
     def __post_init__(self) -> None:
-        _check_numbers(self)
-        _check_increasing(self, "low", "high")
+        check_numbers(self)
+        check_increasing(self, "low", "high")
 
     @property
     def mean(self) -> float:
@@ -93,6 +69,17 @@ class Uniform:
 
 
 @dataclass(frozen=True)
+class Interval(Uniform):
+    """A fixed value somewhere between ``low`` and ``high``, about which nothing else is known: an epistemic input.
+
+    Where a method needs a distribution it is treated as uniform; a probability box keeps it an interval
+    (:mod:`levelone.uncertainty.probability_box`).
+    """
+
+    epistemic: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
 class Normal:
     """Normal distribution with mean ``mean`` and standard deviation ``std``; unbounded."""
 
@@ -100,8 +87,8 @@ class Normal:
     std: float
 
     def __post_init__(self) -> None:
-        _check_numbers(self)
-        _check_positive(self, "std")
+        check_numbers(self)
+        check_positive(self, "std")
 
     @property
     def support(self) -> tuple[float, float]:
@@ -126,9 +113,9 @@ class TruncatedNormal:
     high: float
 
     def __post_init__(self) -> None:
-        _check_numbers(self)
-        _check_positive(self, "std")
-        _check_increasing(self, "low", "high")
+        check_numbers(self)
+        check_positive(self, "std")
+        check_increasing(self, "low", "high")
 
     def _ends(self) -> tuple[float, float]:
         return (self.low - self.centre) / self.std, (self.high - self.centre) / self.std
@@ -158,10 +145,10 @@ class Triangular:
     high: float
 
     def __post_init__(self) -> None:
-        _check_numbers(self)
-        _check_increasing(self, "low", "high")
+        check_numbers(self)
+        check_increasing(self, "low", "high")
         if not self.low <= self.mode <= self.high:
-            raise InputError(_path(self, "mode"), f"{self.mode:g} lies outside low = {self.low:g} to high = {self.high:g}")
+            raise InputError(path(self, "mode"), f"{self.mode:g} lies outside low = {self.low:g} to high = {self.high:g}")
 
     @property
     def mean(self) -> float:
@@ -190,8 +177,8 @@ class LogNormal:
     sigma: float
 
     def __post_init__(self) -> None:
-        _check_numbers(self)
-        _check_positive(self, "sigma")
+        check_numbers(self)
+        check_positive(self, "sigma")
 
     @property
     def mean(self) -> float:
@@ -223,11 +210,11 @@ class Discrete:
         values = np.asarray(self.values, dtype=np.float64)
         weights = np.ones(values.shape) if self.weights is None else np.asarray(self.weights, dtype=np.float64)
         if values.ndim != 1 or values.size < 2 or not np.isfinite(values).all():
-            raise InputError(_path(self, "values"), f"{self.values!r}: two or more finite numbers are needed")
+            raise InputError(path(self, "values"), f"{self.values!r}: two or more finite numbers are needed")
         if np.unique(values).size != values.size:
-            raise InputError(_path(self, "values"), f"{self.values!r} holds a value twice; give it a weight instead")
+            raise InputError(path(self, "values"), f"{self.values!r} holds a value twice; give it a weight instead")
         if weights.shape != values.shape or not np.isfinite(weights).all() or (weights <= 0.0).any():
-            raise InputError(_path(self, "weights"), f"{self.weights!r}: one positive number for each value is needed")
+            raise InputError(path(self, "weights"), f"{self.weights!r}: one positive number for each value is needed")
         order = np.argsort(values)
         object.__setattr__(self, "values", tuple(values[order].tolist()))
         object.__setattr__(self, "weights", tuple((weights[order] / weights.sum()).tolist()))
@@ -251,6 +238,8 @@ class Discrete:
 DISTRIBUTIONS: Mapping[str, type] = MappingProxyType(
     {
         "uniform": Uniform,
+        "interval": Interval,
+        "evidence": Evidence,
         "normal": Normal,
         "truncated_normal": TruncatedNormal,
         "triangular": Triangular,

@@ -10,11 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from levelone.errors import InputError, unknown_name
+from levelone.uncertainty.copula import UNIT_MARGIN, dependent, score_correlation
 from levelone.uncertainty.distributions import Distribution, FloatArray
-
-# Point sets may hit 0 or 1 exactly, where an unbounded distribution is infinite; half the spacing of a 30-bit Sobol
-# sequence.
-_UNIT_MARGIN = 2.0**-31
 
 
 @dataclass(frozen=True)
@@ -55,17 +52,38 @@ class Factor:
 
 @dataclass(frozen=True)
 class FactorSpace:
-    """The factors of a study, in order; independent of one another."""
+    """The factors of a study, in order.
+
+    Parameters
+    ----------
+    factors
+        The factors.
+    correlation
+        [k, k] Spearman rank correlations of a Gaussian copula (see :mod:`levelone.uncertainty.copula`); independent factors
+        by default. They are those of the coordinates in the unit cube: a discrete factor, whose values are tied, shows less.
+
+    Raises
+    ------
+    InputError
+        No factor, a name given twice, correlations that no set of variables can have (the error names the pair to change).
+    """
 
     factors: tuple[Factor, ...]
+    correlation: tuple[tuple[float, ...], ...] | None = None
 
-    def __init__(self, factors: Iterable[Factor]) -> None:
+    def __init__(self, factors: Iterable[Factor], correlation: ArrayLike | None = None) -> None:
         object.__setattr__(self, "factors", tuple(factors))
         if not self.factors:
             raise InputError("factors", "at least one factor is needed")
         twice = [name for name, count in Counter(self.names).items() if count > 1]
         if twice:
             raise InputError("factors", f"name given twice: {', '.join(twice)}")
+        rank = None if correlation is None else np.array(correlation, dtype=np.float64)
+        if rank is not None:
+            score_correlation(rank, self.names)
+            # A unit matrix says what leaving it out says: the two spaces are equal, and map points bit for bit alike.
+            rank = None if np.array_equal(rank, np.eye(len(self))) else rank
+        object.__setattr__(self, "correlation", None if rank is None else tuple(map(tuple, rank.tolist())))
 
     def __len__(self) -> int:
         return len(self.factors)
@@ -74,6 +92,26 @@ class FactorSpace:
     def names(self) -> tuple[str, ...]:
         """Names of the factors, in the order of the columns."""
         return tuple(factor.name for factor in self.factors)
+
+    @property
+    def correlated(self) -> bool:
+        """Whether any two factors depend on each other."""
+        return self.correlation is not None
+
+    def require_independent(self, method: str, instead: str) -> None:
+        """Refuse correlated factors for a method that moves one factor and holds the others, naming what is offered instead."""
+        if self.correlation is not None:
+            rank = np.abs(np.array(self.correlation) - np.eye(len(self)))
+            i, j = np.unravel_index(rank.argmax(), rank.shape)
+            raise InputError(
+                "factors",
+                f"{self.names[i]} and {self.names[j]} are correlated, and {method} moves factors independently of one another; "
+                f"{instead}",
+            )
+
+    def score_correlation(self) -> FloatArray:
+        """Correlations of the normal scores of the copula, [k, k]; the unit matrix for independent factors."""
+        return np.eye(len(self)) if self.correlation is None else score_correlation(self.correlation, self.names)
 
     @property
     def bounded(self) -> bool:
@@ -106,12 +144,13 @@ class FactorSpace:
         Parameters
         ----------
         u
-            [n, k], each coordinate in [0, 1].
+            [n, k], each coordinate in [0, 1]; the coordinates are independent also where the factors are correlated.
 
         Returns
         -------
         [n, k] values, each column in the unit of its factor. Coordinates of unbounded factors are kept 2**-31 away from
-        0 and 1 (6.1 standard deviations of a normal variable), so that every value is finite.
+        0 and 1 (6.1 standard deviations of a normal variable), so that every value is finite. Correlated factors follow
+        the Gaussian copula in the order of the factors: column j depends on coordinates 1 to j.
 
         Raises
         ------
@@ -123,8 +162,10 @@ class FactorSpace:
             raise InputError("u", f"shape {u.shape}; [n, {len(self)}] is needed, one column for each factor")
         if not ((u >= 0.0) & (u <= 1.0)).all():
             raise InputError("u", "a coordinate of the unit cube lies outside 0 to 1 or is NaN")
+        if self.correlation is not None:
+            u = dependent(u, self.score_correlation())
         values = np.empty_like(u)
         for j, factor in enumerate(self.factors):
-            column = u[:, j] if factor.bounded else np.clip(u[:, j], _UNIT_MARGIN, 1.0 - _UNIT_MARGIN)
+            column = u[:, j] if factor.bounded else np.clip(u[:, j], UNIT_MARGIN, 1.0 - UNIT_MARGIN)
             values[:, j] = factor.distribution.ppf(column)
         return values

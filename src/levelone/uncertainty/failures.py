@@ -30,6 +30,7 @@ class EstimateStatus(IntEnum):
     OK = 0
     CONSTANT_RESPONSE = 1
     TOO_FEW_RUNS = 2
+    TOO_FEW_SCRAMBLINGS = 3
 
     @property
     def text(self) -> str:
@@ -41,6 +42,7 @@ _TEXT = {
     EstimateStatus.OK: "ok",
     EstimateStatus.CONSTANT_RESPONSE: "the response does not vary over the design: it has no variance to share out",
     EstimateStatus.TOO_FEW_RUNS: "too few runs without failure are left for an estimate",
+    EstimateStatus.TOO_FEW_SCRAMBLINGS: "runs without failure differ in fewer than four scramblings: no honest interval",
 }
 
 

@@ -117,17 +117,17 @@ class Kriging:
         InputError
             Shapes that disagree, values that are not finite, an input that never varies, an unknown option.
         """
-        x, y = _check_data(x, y)
+        x, y = check_data(x, y)
         kinds = CORRELATIONS if correlation == "likeliest" else (_check_correlation(correlation),)
         if starts < 1:
             raise InputError("starts", f"{starts!r}; at least one is needed")
         check_seed(seed)
-        status = _status(y, _trend_functions(x, trend))
+        status = _status(y, trend_functions(x, trend))
         if status is not EstimateStatus.OK:
             return cls._degenerate(x, y, kinds[0], trend, status)
         u = (x - x.min(axis=0)) / np.ptp(x, axis=0)
         with OneBlasThread():
-            found = search(u, (y - y.mean()) / y.std(), _trend_functions(u, trend), kinds, nugget, seed, starts)
+            found = search(u, (y - y.mean()) / y.std(), trend_functions(u, trend), kinds, nugget, seed, starts)
         k = x.shape[1]
         ratio = float(np.exp(found.parameters[k])) if nugget else 0.0
         return cls.condition(x, y, np.exp(found.parameters[:k]), ratio, correlation=found.kind, trend=trend)
@@ -144,16 +144,16 @@ class Kriging:
         trend: Trend = "constant",
     ) -> Kriging:
         """Condition on the data without a search: at given length scales [k], in units of the range of each input."""
-        x, y = _check_data(x, y)
+        x, y = check_data(x, y)
         lengths = np.array(lengths, dtype=np.float64)
         if lengths.shape != (x.shape[1],) or not (lengths > 0.0).all() or not nugget >= 0.0:
             raise InputError("lengths", f"{lengths} and nugget {nugget!r}; {x.shape[1]} positive numbers, nugget >= 0")
-        status = _status(y, _trend_functions(x, trend))
+        status = _status(y, trend_functions(x, trend))
         if status is not EstimateStatus.OK:
             return cls._degenerate(x, y, _check_correlation(correlation), trend, status)
         low, width = x.min(axis=0), np.ptp(x, axis=0)
         u, y_mean, y_std = (x - low) / width, float(y.mean()), float(y.std())
-        basis = _trend_functions(u, trend)
+        basis = trend_functions(u, trend)
         likelihood = RestrictedLikelihood(u, (y - y_mean) / y_std, basis, _check_correlation(correlation))
         with OneBlasThread():
             solves = likelihood.solves(lengths, nugget)
@@ -171,6 +171,21 @@ class Kriging:
         unknown = np.full(len(y), np.nan)
         lengths = np.full(x.shape[1], np.nan)
         return cls(correlation, trend, lengths, np.nan, np.nan, np.nan, unknown, unknown, status, constant)
+
+    @property
+    def trend_terms(self) -> int:
+        """Number of functions that make the trend."""
+        return 1 if self.trend == "constant" else 1 + len(self.lengths)
+
+    def require_runs(self, x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """The runs x [n, k], y [n] as arrays; InputError where they are not those that the model was fitted to."""
+        x, y = check_data(x, y)
+        same = x.shape == (len(self.loo_residual), len(self.lengths))
+        if same and isinstance(self._memory, _Memory):
+            same = np.array_equal(x.min(axis=0), self._memory.x_low) and y.mean() == self._memory.y_mean
+        if not same:
+            raise InputError("x, y", f"{len(y)} runs that are not the {len(self.loo_residual)} runs that the model was fitted to")
+        return x, y
 
     def predict(self, x: ArrayLike) -> Prediction:
         """Mean and standard deviation of the response without its noise at x [n, k].
@@ -217,7 +232,7 @@ class Kriging:
             u = (points[start : start + _CHUNK] - memory.x_low) / memory.x_width
             m = len(u)
             squared_distances(u / self.lengths, memory.z, out=r2[:m])
-            yield slice(start, start + m), correlate(self.correlation, r2[:m], k[:m]), _trend_functions(u, self.trend)
+            yield slice(start, start + m), correlate(self.correlation, r2[:m], k[:m]), trend_functions(u, self.trend)
 
 
 def _leave_one_out(solves: Solves, variance: float) -> tuple[FloatArray, FloatArray]:
@@ -233,7 +248,7 @@ def _leave_one_out(solves: Solves, variance: float) -> tuple[FloatArray, FloatAr
     return solves.alpha / q, np.sqrt(variance / q)
 
 
-def _trend_functions(u: FloatArray, trend: Trend) -> FloatArray:
+def trend_functions(u: FloatArray, trend: Trend) -> FloatArray:
     """Trend functions [n, p] at points of the unit cube."""
     ones = np.ones((len(u), 1))
     if trend == "constant":
@@ -256,7 +271,7 @@ def _check_correlation(correlation: str) -> Correlation:
     raise unknown_name("correlation", correlation, (*CORRELATIONS, "likeliest"))
 
 
-def _check_data(x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def check_data(x: ArrayLike, y: ArrayLike) -> tuple[FloatArray, FloatArray]:
     x, y = np.array(x, dtype=np.float64), np.array(y, dtype=np.float64)
     if x.ndim != 2 or y.shape != x.shape[:1]:
         raise InputError("x, y", f"shapes {x.shape} and {y.shape}; [n, k] and [n] are needed")

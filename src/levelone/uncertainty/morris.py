@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from levelone.uncertainty.bootstrap import interval, resampled_means
 from levelone.uncertainty.designs import Design
 from levelone.uncertainty.distributions import FloatArray
+from levelone.uncertainty.failure_doubt import doubt, gathered_p, leaves
 from levelone.uncertainty.failures import (
     EstimateStatus,
     Policy,
@@ -18,27 +19,32 @@ from levelone.uncertainty.failures import (
     check_policy,
     complete_blocks,
 )
+from levelone.uncertainty.groups import group_columns
 
 
 @dataclass(frozen=True, eq=False)
 class MorrisIndices:
-    """Statistics of the elementary effects of one response, in its unit, for each of k factors.
+    """Statistics of the elementary effects of one response, in its unit, for each of k factors or groups of factors.
 
     Attributes
     ----------
     names
-        Names of the factors.
+        Names of the factors, or of the groups of a grouped design.
     mu, mu_star, sigma, distance
         [k]: mean of the effects, mean of their magnitudes, standard deviation (divisor r - 1), sqrt(mu_star^2 +
-        sigma^2).
+        sigma^2). For a group of several factors, whose steps go different ways, only mu_star is defined; the others are
+        NaN.
     mu_ci, mu_star_ci, sigma_ci, distance_ci
         [k, 2]: 95 % bootstrap intervals over trajectories.
     effects
-        [r, k]: elementary effects of the r trajectories used.
+        [r, k]: elementary effects of the r trajectories used; magnitudes for a group of several factors.
     trajectories
         Trajectories of the design.
     failed
         Runs that failed.
+    failure_p
+        Whether failures gather in a part of the factor box, over the two ends of a trajectory or the base point of a radial
+        block: :func:`levelone.uncertainty.failure_doubt.gathered_p`.
     status
         ``TOO_FEW_RUNS`` where fewer than two trajectories are complete: every figure is then NaN.
     bounding
@@ -58,8 +64,22 @@ class MorrisIndices:
     effects: FloatArray
     trajectories: int
     failed: int
+    failure_p: float
     status: EstimateStatus
     bounding: tuple[MorrisIndices, MorrisIndices] | None = None
+
+    @property
+    def doubt(self) -> str:
+        """Why these figures cannot be trusted, in words; empty where nothing speaks against them.
+
+        See :func:`levelone.uncertainty.failure_doubt.doubt`. What must not move is mu_star.
+        """
+        moved = (
+            None
+            if self.bounding is None
+            else leaves(self.mu_star_ci, [side.mu_star for side in self.bounding], float(self.mu_star.max()))
+        )
+        return doubt(self.status, self.failed, self.failure_p, moved)
 
 
 def morris(design: Design, values: ArrayLike, *, bootstrap: int = 1000, policy: Policy = "refuse") -> MorrisIndices:
@@ -69,12 +89,13 @@ def morris(design: Design, values: ArrayLike, *, bootstrap: int = 1000, policy: 
     Software 22, 2007, 1509-1518.
 
     An elementary effect is the change of the response over one step of one factor, divided by the step in the unit
-    cube: its unit is that of the response, and for a linear response it is the change over the factor's whole range.
+    cube: its unit is that of the response, and for a linear response it is the change over the factor's whole range. The
+    effect of a group is the magnitude of the change when all its factors move by a step.
 
     Parameters
     ----------
     design
-        From :func:`levelone.uncertainty.designs.morris_design`.
+        From :func:`levelone.uncertainty.designs.morris_design` or :mod:`levelone.uncertainty.morris_designs`.
     values
         [runs], one response; NaN where a run failed.
     bootstrap
@@ -90,33 +111,52 @@ def morris(design: Design, values: ArrayLike, *, bootstrap: int = 1000, policy: 
     design.require("morris")
     y = as_values(values, design.runs)
     check_policy(policy, y)
-    failed = int(np.isnan(y).sum())
+    failed = np.isnan(y)
+    rows = [0, design.block - 1] if design.levels else [0]
+    independent = np.isin(np.arange(design.runs) % design.block, rows)
+    failures = int(failed.sum()), gathered_p(design.points[independent], failed[independent])
     bounding = None
-    if policy == "bound" and failed:
-        low, high = (_indices(design, filled, bootstrap, failed) for filled in bounding_values(y))
+    if policy == "bound" and failures[0]:
+        low, high = (_indices(design, filled, bootstrap, failures) for filled in bounding_values(y))
         bounding = (low, high)
-    return _indices(design, y, bootstrap, failed, bounding)
+    return _indices(design, y, bootstrap, failures, bounding)
 
 
 def elementary_effects(design: Design, values: FloatArray) -> FloatArray:
-    """Elementary effects [trajectories, k]; NaN where one end of the step failed."""
-    k = len(design.space)
-    unit = design.unit_points.reshape(design.base, k + 1, k)
-    step = np.diff(unit, axis=1)
+    """Elementary effects [trajectories, columns]; NaN where one end of the step failed, magnitudes for groups of several factors.
+
+    A column is a factor, or a group of factors that move together.
+    """
+    columns = group_columns(design.space, design.groups)
+    unit = design.unit_points.reshape(design.base, design.block, -1)
+    y = values.reshape(design.base, design.block)
+    if design.levels == 0:
+        j = np.arange(len(columns))
+        effects: FloatArray = (y[:, 1:] - y[:, :1]) / (unit[:, 1 + j, j] - unit[:, 0, j])
+        return effects
+    # The first factor of each group tells which group moved, and which way a factor that is alone moved.
+    step = np.diff(unit, axis=1)[:, :, [column[0] for column in columns]]
     moved = np.abs(step).argmax(axis=2)
     sign = np.sign(np.take_along_axis(step, moved[:, :, None], axis=2)[:, :, 0])
     delta = design.levels / (2.0 * (design.levels - 1))
-    change = np.diff(values.reshape(design.base, k + 1), axis=1) * sign / delta
-    effects = np.empty((design.base, k))
+    change = np.diff(y, axis=1) * sign / delta
+    effects = np.empty((design.base, len(columns)))
     np.put_along_axis(effects, moved, change, axis=1)
+    several = _several(design)
+    effects[:, several] = np.abs(effects[:, several])
     return effects
+
+
+def _several(design: Design) -> list[int]:
+    """Columns that are groups of more than one factor: their effects have no sign."""
+    return [j for j, column in enumerate(group_columns(design.space, design.groups)) if len(column) > 1]
 
 
 def _indices(
     design: Design,
     y: FloatArray,
     bootstrap: int,
-    failed: int,
+    failures: tuple[int, float],
     bounding: tuple[MorrisIndices, MorrisIndices] | None = None,
 ) -> MorrisIndices:
     effects = elementary_effects(design, y)[complete_blocks(y, design.block)]
@@ -131,14 +171,16 @@ def _indices(
         point = _statistics(centre, terms.mean(axis=0)[None], r)[:, 0]
         means = resampled_means(terms, bootstrap, design.seed, "bootstrap of morris")
         ci = np.array([interval(replicates) for replicates in _statistics(centre, means, r)])
+        several = _several(design)
+        point[np.ix_([0, 2, 3], several)], ci[np.ix_([0, 2, 3], several)] = np.nan, np.nan
         status = EstimateStatus.OK
     return MorrisIndices(
-        design.names,
+        design.columns,
         *(point[0], point[1], point[2], point[3]),
         *(ci[0], ci[1], ci[2], ci[3]),
         effects,
         design.base,
-        failed,
+        *failures,
         status,
         bounding,
     )
