@@ -20,7 +20,7 @@ from levelone.report.pictures import Picture
 from levelone.report.results import Results, read_group
 
 FILE = "surrogates.nc"
-_MARGINS = style.Margins(left=0.42, top=0.3, between=0.5, beside=0.3)
+_MARGINS = style.Margins(left=0.42, top=0.46, between=0.5, beside=0.3)
 _DOT: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 1.7, "markeredgewidth": 0.0, "color": style.BLUE}
 _LINE: dict[str, Any] = {"color": style.VERMILLION, "linewidth": 0.8, "linestyle": "--"}
 _REACH = 4.5
@@ -57,7 +57,7 @@ def draw_residuals(data: xr.Dataset) -> Figure:
     names = [str(name) for name in data["response"].values]
     columns = min(4, len(names))
     rows = -(-len(names) // columns)
-    figure, axes = style.sheet(style.PAGE, 0.7 + 1.25 * rows + 0.5 * (rows - 1), rows, columns, margins=_MARGINS)
+    figure, axes = style.sheet(style.PAGE, 0.86 + 1.25 * rows + 0.5 * (rows - 1), rows, columns, margins=_MARGINS)
     for panel, name in zip(axes.flat, names, strict=False):
         _panel(panel, name, data.sel(response=name))
     for panel in axes.flat[len(names) :]:
@@ -93,9 +93,10 @@ def _validation(results: Results, name: str) -> dict[str, Any]:
     surrogate, chaos = results.responses[name]["surrogate"], results.summary["measures"][name]["chaos"]
     checked = surrogate["validation"]
     return {
-        "title": symbols.title(name), "symbol": symbols.html(name), "q2": number(surrogate["q2"], 6),
-        "holdout": number(checked["q2_holdout"], 6), "coverage": percent(checked["coverage_95"]), "verdict": checked["verdict"],
-        "chaos": number(chaos["q2"], 6), "terms": chaos["terms"], "apart": number(_apart(results, name), 2),
+        "title": symbols.title(name), "symbol": symbols.html(name), "q2": number(1.0 - surrogate["q2"], 2),
+        "holdout": number(1.0 - checked["q2_holdout"], 2), "coverage": percent(checked["coverage_95"]),
+        "verdict": checked["verdict"],
+        "chaos": number(1.0 - chaos["q2"], 2), "terms": chaos["terms"], "apart": number(_apart(results, name), 2),
     }  # fmt: skip
 
 

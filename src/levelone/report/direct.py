@@ -26,7 +26,7 @@ _SURROGATE: dict[str, Any] = {
     "linestyle": "none", "marker": "s", "markersize": 3.4, "markeredgewidth": 0.8, "markerfacecolor": "white",
     "color": style.VERMILLION,
 }  # fmt: skip
-_MARGINS = style.Margins(left=0.36, top=0.3, between=0.45, beside=0.42)
+_MARGINS = style.Margins(left=0.36, top=0.46, between=0.45, beside=0.42)
 _APART = 0.17
 """Rows by which the two marks of a factor stand above and below its line."""
 OTHER_STUDY = "this decomposition belongs to another version of the study or of the vehicle: decompose again"
@@ -100,7 +100,7 @@ def draw_direct(results: Results, found: Mapping[str, Any]) -> Figure:
     entries = found["responses"]
     columns = min(3, len(entries))
     rows = -(-len(entries) // columns)
-    height = 0.55 + rows * (0.25 + 0.165 * len(found["names"])) + 0.25 * (rows - 1)
+    height = 0.71 + rows * (0.25 + 0.165 * len(found["names"])) + 0.25 * (rows - 1)
     figure, axes = style.sheet(style.PAGE, height, rows, columns, margins=_MARGINS)
     for panel, (name, entry) in zip(axes.flat, entries.items(), strict=False):
         _panel(panel, name, entry["sobol"], _surrogate(results, found, name))
