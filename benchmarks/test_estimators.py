@@ -5,41 +5,21 @@
 
 from __future__ import annotations
 
-import tomllib
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import ks_2samp
 
-from levelone.uncertainty import Factor, FactorSpace, Normal, Uniform, morris, morris_design
+from exact_functions import REFERENCE, SPACE, K, exact, ishigami, sobol_g
+from levelone.uncertainty import Factor, FactorSpace, Normal, morris, morris_design
 from levelone.uncertainty.dgsm import derivative_design, derivative_measures
 from levelone.uncertainty.given_data import given_data
 from levelone.uncertainty.hsic import dependence
 from levelone.uncertainty.morris_designs import radial_design
 from levelone.uncertainty.shapley import shapley, shapley_design
 
-REFERENCE = tomllib.loads((Path(__file__).parents[1] / "tests" / "reference" / "uncertainty.toml").read_text(encoding="utf-8"))
-K = 14
-NAMES = [f"x{j + 1}" for j in range(K)]
-SPACE = FactorSpace([Factor(name, Uniform(0.0, 1.0)) for name in NAMES])
-
-
-def ishigami(u):
-    x = np.pi * (2.0 * u - 1.0)
-    a, b = REFERENCE["ishigami"]["a"], REFERENCE["ishigami"]["b"]
-    return np.sin(x[:, 0]) + a * np.sin(x[:, 1]) ** 2 + b * x[:, 2] ** 4 * np.sin(x[:, 0])
-
-
-def sobol_g(u):
-    a = np.array(REFERENCE["sobol_g"]["a"])
-    return np.prod((np.abs(4.0 * u - 2.0) + a) / (1.0 + a), axis=1)
-
-
-def exact(name, index):
-    listed = REFERENCE[name][index]
-    return np.array(listed + [0.0 if name == "ishigami" else listed[-1]] * (K - len(listed)))
+NAMES = list(SPACE.names)
 
 
 def exact_shapley(name):

@@ -8,43 +8,20 @@ run on one machine; a peer that is not installed is left out with its name.
 from __future__ import annotations
 
 import time
-import tomllib
 import warnings
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from levelone.uncertainty import Factor, FactorSpace, Kriging, Uniform, latin_hypercube, sobol, sobol_design
+from exact_functions import FUNCTIONS, NEW, SPACE, K, exact
+from levelone.uncertainty import Kriging, latin_hypercube, sobol, sobol_design
 from levelone.uncertainty.pce import PolynomialChaos
 
-REFERENCE = tomllib.loads((Path(__file__).parents[1] / "tests" / "reference" / "uncertainty.toml").read_text(encoding="utf-8"))
-K, RUNS, BASE, SEED = 14, 500, 2**14, 0
-SPACE = FactorSpace([Factor(f"x{j + 1}", Uniform(0.0, 1.0)) for j in range(K)])
-NEW = np.random.default_rng(99).random((10_000, K))
+RUNS, BASE, SEED = 500, 2**14, 0
 # Rows that a peer predicts at once: more, and its arrays leave the cache and then the memory.
 ROWS = 4096
-
-
-def ishigami(u):
-    x = np.pi * (2.0 * u - 1.0)
-    a, b = REFERENCE["ishigami"]["a"], REFERENCE["ishigami"]["b"]
-    return np.sin(x[:, 0]) + a * np.sin(x[:, 1]) ** 2 + b * x[:, 2] ** 4 * np.sin(x[:, 0])
-
-
-def sobol_g(u):
-    a = np.array(REFERENCE["sobol_g"]["a"])
-    return np.prod((np.abs(4.0 * u - 2.0) + a) / (1.0 + a), axis=1)
-
-
-FUNCTIONS = {"ishigami": ishigami, "sobol_g": sobol_g}
-
-
-def exact_st(name):
-    listed = REFERENCE[name]["ST"]
-    return np.array(listed + [0.0 if name == "ishigami" else listed[-1]] * (K - len(listed)))
 
 
 @dataclass(frozen=True)
@@ -93,7 +70,7 @@ def measure(who, build, name, x, y):
         indices = sobol(design, predict(design.unit_points))
         cpu = time.process_time() - start
         q2 = 1.0 - np.mean((predict(NEW) - truth) ** 2) / truth.var()
-    return Line(who, cpu, q2, np.abs(indices.ST - exact_st(name)).max())
+    return Line(who, cpu, q2, np.abs(indices.ST - exact(name, "ST")).max())
 
 
 def chaos(name, x, y):
@@ -103,14 +80,14 @@ def chaos(name, x, y):
         model = PolynomialChaos.fit(x, y, SEED)
         cpu = time.process_time() - start
         q2 = 1.0 - np.mean((model.predict_mean(NEW) - truth) ** 2) / truth.var()
-    return Line("levelone, polynomial chaos", cpu, q2, np.abs(model.ST - exact_st(name)).max())
+    return Line("levelone, polynomial chaos", cpu, q2, np.abs(model.ST - exact(name, "ST")).max())
 
 
 def dakota(name, x, y):
     from dakota_route import surfpack_vbd
 
     found = surfpack_vbd(x, y, base_points=BASE)
-    return Line("Dakota, surfpack", found["cpu"], np.nan, np.abs(np.array(found["ST"]) - exact_st(name)).max())
+    return Line("Dakota, surfpack", found["cpu"], np.nan, np.abs(np.array(found["ST"]) - exact(name, "ST")).max())
 
 
 def peers(name, x, y):

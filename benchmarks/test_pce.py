@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
+from exact_functions import FUNCTIONS, NEW, SPACE, K, exact
 from levelone.uncertainty import latin_hypercube
 from levelone.uncertainty.pce import PolynomialChaos
-from test_kriging_peers import FUNCTIONS, NEW, SPACE, K, exact_st
 
 REPETITIONS = {100: 50, 200: 30, 500: 10}
 
@@ -27,17 +27,17 @@ def true_q2(name, mean):
 @pytest.mark.parametrize("runs", REPETITIONS)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_levelone(capsys, name, runs):
-    exact, rows = exact_st(name), []
-    active = exact > 0.005
+    truth, rows = exact(name, "ST"), []
+    active = truth > 0.005
     for seed in range(REPETITIONS[runs]):
         x = latin_hypercube(SPACE, runs, seed).unit_points
         y = FUNCTIONS[name](x)
         start = time.process_time()
         model = PolynomialChaos.fit(x, y, seed)
         cpu = time.process_time() - start
-        inside = (model.ST_ci[:, 0] <= exact) & (exact <= model.ST_ci[:, 1])
+        inside = (model.ST_ci[:, 0] <= truth) & (truth <= model.ST_ci[:, 1])
         width = np.median(np.diff(model.ST_ci[active], axis=1))
-        error = np.abs(model.ST - exact).max()
+        error = np.abs(model.ST - truth).max()
         rows.append([cpu, model.q2, model.q2_loo, true_q2(name, model.predict_mean(NEW)), error, inside[active].mean(), width])
     cpu, q2, loo, true, error, inside, width = np.array(rows).T
     with capsys.disabled():
@@ -69,7 +69,7 @@ def test_openturns_with_a_selection_of_its_own(capsys, name):
         cpu = time.process_time() - start
         mean = np.array(result.getMetaModel()(ot.Sample(NEW))).ravel()
         shares = ot.FunctionalChaosSobolIndices(result)
-        error = np.abs([shares.getSobolTotalIndex(j) for j in range(K)] - exact_st(name)).max()
+        error = np.abs([shares.getSobolTotalIndex(j) for j in range(K)] - exact(name, "ST")).max()
         print(
             f"\n{name} 500 runs, OpenTURNS LARS, {size} candidates: {cpu:.1f} CPU s, {len(result.getIndices())} terms, "
             f"Q2 true {true_q2(name, mean):.4f}, largest ST error {error:.4f}"

@@ -9,32 +9,17 @@ from __future__ import annotations
 
 import os
 import time
-import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from levelone.uncertainty import Factor, FactorSpace, Kriging, Uniform, latin_hypercube, sobol_design
+from exact_functions import SPACE, K, exact_pair, ishigami, sobol_g
+from levelone.uncertainty import Kriging, latin_hypercube, sobol_design
 from levelone.uncertainty.surrogate_intervals import sobol_on_surrogate
 
-REFERENCE = tomllib.loads((Path(__file__).parents[1] / "tests" / "reference" / "uncertainty.toml").read_text(encoding="utf-8"))
 REPETITIONS = int(os.environ.get("LEVELONE_REPETITIONS", "200"))
 BASE_POINTS = int(os.environ.get("LEVELONE_BASE_POINTS", "4096"))
-K = 14
-SPACE = FactorSpace([Factor(f"x{j + 1}", Uniform(0.0, 1.0)) for j in range(K)])
 ACTIVE = 0.01
-
-
-def ishigami(u):
-    x = np.pi * (2.0 * u - 1.0)
-    a, b = REFERENCE["ishigami"]["a"], REFERENCE["ishigami"]["b"]
-    return np.sin(x[:, 0]) + a * np.sin(x[:, 1]) ** 2 + b * x[:, 2] ** 4 * np.sin(x[:, 0])
-
-
-def sobol_g(u):
-    a = np.array(REFERENCE["sobol_g"]["a"])
-    return np.prod((np.abs(4.0 * u - 2.0) + a) / (1.0 + a), axis=1)
 
 
 # Smooth blocks of interacting inputs; the inputs of no block are inert.
@@ -48,14 +33,6 @@ BLOCKS = (
 
 def blocks(u):
     return sum(block(*u[:, inputs].T) for inputs, block in BLOCKS)
-
-
-def listed(name):
-    rows = []
-    for index in ("S1", "ST"):
-        values = REFERENCE[name][index]
-        rows.append(values + [0.0 if name == "ishigami" else values[-1]] * (K - len(values)))
-    return np.array(rows)
 
 
 def blocks_exact():
@@ -81,7 +58,11 @@ def blocks_exact():
     return parts / total
 
 
-CASES = {"ishigami": (ishigami, listed("ishigami")), "sobol_g": (sobol_g, listed("sobol_g")), "blocks": (blocks, blocks_exact())}
+CASES = {
+    "ishigami": (ishigami, exact_pair("ishigami", K)),
+    "sobol_g": (sobol_g, exact_pair("sobol_g", K)),
+    "blocks": (blocks, blocks_exact()),
+}
 
 
 def repeat(function, n, design):
