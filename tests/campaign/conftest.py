@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,8 +10,17 @@ import pytest
 
 from levelone.campaign import run_study
 from levelone.config.study_file import Study, load_study
+from levelone.uncertainty import surrogate_intervals
 
 STUDY = Path(__file__).parents[2] / "studies" / "reference" / "study.toml"
+
+
+@pytest.fixture(scope="session", autouse=True)
+def few_draws() -> Iterator[None]:
+    """Few functions are drawn for the intervals of each response: what a study does with them is tested here, not their width."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(surrogate_intervals, "DRAWS", 3)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -19,6 +19,7 @@ import xarray as xr
 from levelone.campaign.coupling import NO_PATH, PITCH
 from levelone.report import amplitudes, cases, coupling, delay, froude, page, translation
 from levelone.report.results import Results, load_results
+from levelone.report.sections import SECTIONS as PAGE_SECTIONS
 from levelone.status import Status
 
 SECTIONS: dict[str, tuple[ModuleType, str]] = {
@@ -163,7 +164,7 @@ class Walk(HTMLParser):
 
 def section(results: Results, name: str) -> Walk:
     """One section as the page has it, without pictures."""
-    module, key = SECTIONS[name]
+    module, key, _ = PAGE_SECTIONS[name]
     environment = page.environment()
     made = environment.from_string('{% from "macros.html" import table %}' + f'{{% include "{name}.html" %}}')
     walk = Walk(made.render({name: module.context(results), "drawings": {key: []}}))

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from synthetic_sections import section
 
 from levelone.errors import InputError
-from levelone.report import direct, render_report, style
+from levelone.report import direct, style
 from levelone.report.results import Results
 
 COST = {"wall_s": 90.0, "cpu_s": 170.0, "peak_memory_gib": 0.4}
@@ -73,20 +74,17 @@ def test_the_page_shows_it(results: Results, tmp_path: Path) -> None:
     content = decomposition(results)
     content["responses"]["zeta"]["doubt"] = "failed runs gather"
     content["responses"]["zeta"]["S2"] = [{"pair": ["K_T", "I_y"], "S2": 0.125, "S2_ci": [0.1, 0.15]}]
-    with_direct(results, tmp_path, content)
-    page = render_report(tmp_path).read_text(encoding="utf-8")
-    assert 'href="#direct"' in page
-    assert "65536 runs of the flight simulation model" in page
-    assert "failed runs gather" in page
-    assert "0.125" in page
+    text = section(with_direct(results, tmp_path, content), "direct").text
+    assert "65536 runs of the flight simulation model" in text
+    assert "failed runs gather" in text
+    assert "0.125" in text
 
 
 def test_that_of_another_version_is_not_compared(results: Results, tmp_path: Path) -> None:
     there = with_direct(results, tmp_path, decomposition(results) | {"study_sha256": "other"})
     assert direct.context(there)["outdated"] == direct.OTHER_STUDY
     assert direct.pictures(there) == []
-    page = render_report(tmp_path).read_text(encoding="utf-8")
-    assert "decompose again" in page
+    assert "decompose again" in section(there, "direct").text
 
 
 @pytest.mark.parametrize(("text", "words"), [("{", "cannot be read"), ('{"schema": 0}', "another schema")])

@@ -84,7 +84,9 @@ def with_errors(block: Json, found: SurrogateError) -> Json:
                 row, ci = sobol[name], getattr(found.indices, f"{index}_ci")
                 if np.isfinite(row[index]):
                     row |= {f"{index}_ci_sampling": row[f"{index}_ci"], f"{index}_ci": ci[j].tolist()}
-    return block | {"sobol": sobol, "surrogate": block["surrogate"] | {"validation": validation_json(found.validation)}}
+    kind = "none: no indices" if found.indices is None else found.indices.error_kind
+    told = {"validation": validation_json(found.validation), "error_kind": kind}
+    return block | {"sobol": sobol, "surrogate": block["surrogate"] | told}
 
 
 def residual_dataset(sampled: Sampled) -> xr.Dataset:

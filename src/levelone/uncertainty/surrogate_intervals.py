@@ -33,8 +33,10 @@ from levelone.uncertainty.paths import posterior_paths
 from levelone.uncertainty.pick_freeze import pick_freeze_ratios, pick_freeze_terms
 from levelone.uncertainty.seeds import stage_seed
 from levelone.uncertainty.sobol import SobolIndices, sobol
+from levelone.uncertainty.surrogate_bound import worst_case
 
 Coordinates = Literal["unit", "physical"]
+ErrorKind = Literal["bounded", "drawn"]
 
 DRAWS, PATHS = 20, 8
 """Draws of the hyperparameters, and functions drawn at each."""
@@ -47,6 +49,9 @@ GROUPS = 5
 """Groups of runs left out in turn."""
 GROUP_POINTS = 2048
 """Base points on which the indices without each group are compared."""
+MINOR, NEGLIGIBLE = 0.5, 1e-3
+"""The worst case of a very good surrogate stands for its error where no index is moved by more than the first part of its sampling
+error, or by more than the second share of the variance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +72,10 @@ class SurrogateIndices:
         [k]: mean index of the drawn functions minus that of the surrogate's mean. A drawn function varies between the runs
         where the mean is smooth; this adds variance that no single input explains, so that the shift of S1 is mostly
         negative and that of ST positive. The intervals hold the estimate with and without it.
+    error_kind
+        How the surrogate's error was found: "drawn" functions and the jackknife, or "bounded" by the worst case
+        (:mod:`levelone.uncertainty.surrogate_bound`), where that is minor beside the sampling error: shifts, inflation and
+        acceptance are then NaN.
     inflation
         Factor on the posterior's standard deviation: root mean square of the standardised leave-one-out residuals, at least 1.
     acceptance
@@ -86,6 +95,7 @@ class SurrogateIndices:
     ST_ci_sampling: FloatArray
     S1_shift: FloatArray
     ST_shift: FloatArray
+    error_kind: ErrorKind
     inflation: float
     acceptance: float
     sampled: SobolIndices
@@ -109,7 +119,8 @@ def sobol_on_surrogate(
     function and that of the mean on the same points, the lowest of 0, the lower quantile of d, and that quantile with d
     about its mean. e: standard deviation of the index by the jackknife that leaves out a fifth of the runs at a time. s:
     distance of the sampling interval's lower end. z = 1.96. The upper end likewise. Lengths, nugget and variance of the
-    process are drawn from their posterior, the likelihood to the power :data:`POWER`.
+    process are drawn from their posterior, the likelihood to the power :data:`POWER`. Where the surrogate is so good that its worst
+    case is minor beside the sampling error, p is that worst case, e is 0 and nothing is drawn.
 
     Responses may run side by side in threads, one each.
 
@@ -149,13 +160,39 @@ def sobol_on_surrogate(
         status = own if own is not EstimateStatus.OK else sampled.status
         if status is not EstimateStatus.OK:
             return _undefined(sampled, status)
+        bounded = _bounded(sampled, model.q2)
+        if bounded is not None:
+            return bounded
         inflation = max(1.0, float(np.sqrt(np.mean((model.loo_residual / model.loo_std) ** 2))))
         difference, acceptance = _differences(x, y, model, _small(design, PATH_POINTS, seed), coordinates, seed, inflation)
         left_out = _jackknife(x, y, model, _small(design, GROUP_POINTS, seed), coordinates, seed)
     ci = _intervals(sampled, difference, left_out)
     shift = difference.mean(axis=0)
     both = (sampled.S1, sampled.ST, ci[0], ci[1], sampled.S1_ci, sampled.ST_ci)
-    return SurrogateIndices(sampled.names, *both, shift[0], shift[1], inflation, acceptance, sampled, status)
+    return SurrogateIndices(sampled.names, *both, shift[0], shift[1], "drawn", inflation, acceptance, sampled, status)
+
+
+def _bounded(sampled: SobolIndices, q2: float) -> SurrogateIndices | None:
+    """Indices whose intervals hold the worst case of the surrogate; None where that is not minor."""
+    estimate, ci = _pair(sampled)
+    reach = np.abs(worst_case(estimate, q2) - np.maximum(estimate, 0.0)[..., None])
+    if not (reach <= np.maximum(MINOR * np.abs(ci - estimate[..., None]), NEGLIGIBLE)).all():
+        return None
+    wide = _joined(estimate, ci, reach)
+    nothing = np.full(len(sampled.names), np.nan)
+    both = (sampled.S1, sampled.ST, wide[0], wide[1], sampled.S1_ci, sampled.ST_ci)
+    return SurrogateIndices(sampled.names, *both, nothing, nothing, "bounded", np.nan, np.nan, sampled, EstimateStatus.OK)
+
+
+def _pair(sampled: SobolIndices) -> tuple[FloatArray, FloatArray]:
+    """S1 and ST, [2, k], and their sampling intervals, [2, k, 2]."""
+    return np.array([sampled.S1, sampled.ST]), np.array([sampled.S1_ci, sampled.ST_ci])
+
+
+def _joined(estimate: FloatArray, ci: FloatArray, reach: FloatArray) -> FloatArray:
+    """Intervals [2, k, 2] whose ends lie as far from the estimate as sampling and ``reach`` together, added as squares."""
+    distance = np.sqrt(reach**2 + (ci - estimate[..., None]) ** 2)
+    return estimate[..., None] + distance * np.array([-1.0, 1.0])
 
 
 def _small(design: Design, n: int, seed: int) -> Design:
@@ -210,16 +247,25 @@ def _intervals(sampled: SobolIndices, difference: FloatArray, left_out: FloatArr
     mean = difference.mean(axis=0)
     low, high = np.quantile(difference, [tail, 1.0 - tail], axis=0)
     below, above = np.minimum(np.minimum(low, low - mean), 0.0), np.maximum(np.maximum(high, high - mean), 0.0)
-    estimate = np.array([sampled.S1, sampled.ST])
-    ci = np.array([sampled.S1_ci, sampled.ST_ci])
     jackknife = norm.ppf(1.0 - tail) * left_out
-    lower = np.sqrt(below**2 + jackknife**2 + (estimate - ci[..., 0]) ** 2)
-    upper = np.sqrt(above**2 + jackknife**2 + (ci[..., 1] - estimate) ** 2)
-    return np.stack([estimate - lower, estimate + upper], axis=-1)
+    return _joined(*_pair(sampled), np.hypot(np.stack([below, above], axis=-1), jackknife[..., None]))
 
 
 def _undefined(sampled: SobolIndices, status: EstimateStatus) -> SurrogateIndices:
     nothing, nowhere = np.full(len(sampled.names), np.nan), np.full((len(sampled.names), 2), np.nan)
     return SurrogateIndices(
-        sampled.names, nothing, nothing, nowhere, nowhere, nowhere, nowhere, nothing, nothing, np.nan, np.nan, sampled, status
+        sampled.names,
+        nothing,
+        nothing,
+        nowhere,
+        nowhere,
+        nowhere,
+        nowhere,
+        nothing,
+        nothing,
+        "drawn",
+        np.nan,
+        np.nan,
+        sampled,
+        status,
     )
