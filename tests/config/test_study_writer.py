@@ -13,7 +13,7 @@ from levelone.aerodynamics.derivatives import Derivatives
 from levelone.config.study_file import Study, load_study
 from levelone.config.study_writer import APART, LUMPED, Written, write_study
 from levelone.errors import InputError
-from levelone.uncertainty import Uniform
+from levelone.uncertainty import Interval, Uniform
 from levelone.vehicle import TARGETS
 
 STUDY = Path(__file__).parents[2] / "studies" / "reference" / "study.toml"
@@ -150,6 +150,18 @@ def test_factor_under_another_name_and_distribution_is_replaced(study_file) -> N
     assert ends(study, "damping") == pytest.approx([-16.169, -3.5], abs=1e-6)
     assert "factor.damping" not in dict(study.assumed)
     assert 'name = "damping" # of pitch' in path.read_text()
+
+
+@pytest.mark.parametrize("text", ["interval", "evidence"])
+def test_a_factor_of_one_unknown_value_stays_one(study_file, text: str) -> None:
+    old = 'name = "C_mq"\nvalue = -16.169\nunit = "1/rad"\nrange = [-0.20, 0.20]\nkind = "relative"\n'
+    focal = "intervals = [[-19.4, -12.9]]\nmasses = [1.0]\n"
+    new = 'name = "C_mq"\nvalue = -16.169\nunit = "1/rad"\ndistribution = "' + text + '"\n'
+    path = study_file((old, new + ('range = [-0.2, 0.2]\nkind = "relative"\n' if text == "interval" else focal)))
+    write(path, names=["C_mq"])
+    study = load_study(path)
+    assert isinstance(study.space["C_mq"].distribution, Interval)
+    assert ends(study, "C_mq") == pytest.approx([-16.169, -3.5], abs=1e-6)
 
 
 def test_inherited_distribution_does_not_stay(tmp_path: Path, study_file) -> None:

@@ -202,8 +202,10 @@ def _put(document: Any, span: Span, known: Sequence[Mapping[str, Any]], source: 
     for key in ("distribution", *PARAMETERS, *ORIGIN):
         if key in entry and key not in numbers:
             del entry[key]
-    if any(each.get("name") == name and each.get("distribution", "uniform") != "uniform" for each in known):
-        entry["distribution"] = "uniform"
+    given = {each.get("distribution", "uniform") for each in known if each.get("name") == name}
+    if given - {"uniform"}:
+        # a factor with one unknown value stays one: its new range is no distribution either
+        entry["distribution"] = "interval" if given & {"interval", "evidence"} else "uniform"
     for key, value in numbers.items():
         entry[key] = value
 
