@@ -7,13 +7,13 @@ surrogate of another kind.
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 
 from levelone.campaign.sampling import Progress, Sampled
+from levelone.dynamics.simulate import threads_of
 from levelone.uncertainty import Design, FactorSpace, Kriging, stage_seed
 from levelone.uncertainty.distributions import FloatArray
 from levelone.uncertainty.given_data import given_data
@@ -45,7 +45,7 @@ def measures_section(sampled: Sampled, seed: int, threads: int | None, progress:
         return found
 
     progress(STAGE, 0, len(names))
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(threads_of(threads)) as pool:
         return dict(zip(names, pool.map(one, zip(names, sampled.found.surrogates, strict=True)), strict=True))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +11,7 @@ import xarray as xr
 
 from levelone.campaign.sampling import Progress, Sampled
 from levelone.config.study_file import Study
+from levelone.dynamics.simulate import threads_of
 from levelone.uncertainty import (
     Kriging,
     SobolIndices,
@@ -56,7 +56,7 @@ def surrogate_errors(
         return SurrogateError(indices, validate(x, y, model, own))
 
     progress(STAGE, 0, len(names))
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(threads_of(threads)) as pool:
         return dict(zip(names, pool.map(one, names, sampled.found.surrogates, sampled.found.indices), strict=True))
 
 
