@@ -140,5 +140,5 @@ def _on_coverage(within: int, n: int, spread: float) -> str:
     if binom.cdf(within, n, CONFIDENCE) < 0.5 * _DOUBT:
         return f"{found}: its errors are larger than it claims (root mean square {spread:.2f} of the claim)"
     if binom.sf(within - 1, n, CONFIDENCE) < 0.5 * _DOUBT:
-        return f"{found}: its errors are smaller than it claims (root mean square {spread:.2f} of the claim): a safe miss"
+        return f"{found}: its errors are smaller than it claims (root mean square {spread:.2f} of the claim): on the safe side"
     return ""
