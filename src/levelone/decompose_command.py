@@ -102,4 +102,6 @@ def _reached(found: dict[str, Any]) -> str:
     asked = found["until_width"]
     if asked != asked:
         return "no width was asked for"
+    if found["widest"] != found["widest"]:
+        return f"{asked:g} was asked for: no response has intervals"
     return f"{asked:g} was asked for" + ("" if found["widest"] <= asked else ": not reached, raise --most-base-points")

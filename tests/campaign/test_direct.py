@@ -144,6 +144,25 @@ def test_scramblings_are_added_until_intervals_are_narrow(three: Study, tmp_path
     assert content(tmp_path)["widest"] > 1e-6
 
 
+def test_a_response_without_indices_is_not_waited_for(three: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fly = BriefModel.evaluate
+
+    def constant(self: BriefModel, points: np.ndarray, *rest: Any) -> Responses:
+        r = fly(self, points, *rest)
+        values, status = r.values.copy(), r.status.copy()
+        values[:, 0] = 3.0
+        values[:, 1], status[:, 1] = np.nan, Status.DIVERGED
+        return Responses(values, status, r.names, r.units)
+
+    monkeypatch.setattr(BriefModel, "evaluate", constant)
+    decompose_study(three, tmp_path, replace(SMALL, until_width=100.0, most_base_points=2000))
+    found = content(tmp_path)
+    assert found["base_points"] == 64
+    assert np.isfinite(found["widest"])
+    assert found["against_whole_records"]["largest_difference"] == 0.0
+    assert all(found["responses"][name]["doubt"] for name in READ[:2])
+
+
 def test_runs_of_another_study_are_not_taken(three: Study, found: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     decompose_study(three, tmp_path, SMALL)
     flown = counted(monkeypatch)

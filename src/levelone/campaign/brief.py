@@ -109,10 +109,13 @@ def check_against_whole(brief: BriefModel, points: FloatArray) -> dict[str, floa
     short = brief.evaluate(points)
     other = replace(brief, step=brief.whole.step, pulse=brief.whole.pulse, omega=brief.whole.omega).evaluate(points)
     both = np.isfinite(short.values) & np.isfinite(other.values)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        gap = np.abs(short.values - other.values) / np.nanstd(other.values, axis=0)
+    gap = np.zeros(both.shape)
+    for j, known in enumerate(both.T):
+        if known.any():
+            apart, spread = np.abs(short.values[known, j] - other.values[known, j]), other.values[known, j].std()
+            gap[known, j] = np.divide(apart, spread, out=np.where(apart > 0.0, np.inf, 0.0), where=spread > 0.0)
     differ = (np.isfinite(short.values) != np.isfinite(other.values)).any(axis=1)
-    return {"runs": len(points), "largest_difference": float(np.max(gap[both], initial=0.0)), "statuses_differ": int(differ.sum())}
+    return {"runs": len(points), "largest_difference": float(gap.max(initial=0.0)), "statuses_differ": int(differ.sum())}
 
 
 def _shortened(manoeuvre: Manoeuvre, last: float, since: float) -> Manoeuvre:

@@ -27,7 +27,7 @@ from levelone.campaign.study import build_model
 from levelone.config.study_file import Study
 from levelone.errors import InputError
 from levelone.uncertainty import Design, Responses, SobolIndices, sobol, sobol_design, stage_seed
-from levelone.uncertainty.failures import Policy
+from levelone.uncertainty.failures import EstimateStatus, Policy
 from levelone.uncertainty.sobol import widest
 
 SCHEMA = 1
@@ -101,8 +101,8 @@ class Found:
 
     @property
     def width(self) -> float:
-        """The widest interval of S1 and ST of all responses; NaN where one has none."""
-        return float(np.max([widest(each) for each in self.indices.values()]))
+        """The widest interval of S1 and ST of the responses that have intervals; NaN where none has."""
+        return max((widest(each) for each in self.indices.values() if each.status is EstimateStatus.OK), default=float("nan"))
 
 
 def decompose_study(
@@ -145,7 +145,7 @@ def decompose_study(
     store = ScramblingStore(folder / FOLDER, _key(study, seed, plan))
     found = _analysed(study, first, _responses(model, store, first, threads, progress))
     met = 0
-    while plan.until_width is not None:
+    while plan.until_width is not None and np.isfinite(found.width):  # what is undefined, more runs do not mend
         met = met + 1 if found.width <= plan.until_width else 0
         if met == CONFIRMED or found.design.base + ADDED * plan.each > plan.most_base_points:
             break
