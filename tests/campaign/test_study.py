@@ -167,3 +167,15 @@ def test_results_folder_that_is_a_file(study: Study, tmp_path: Path) -> None:
 def test_unknown_target_names_the_closest() -> None:
     with pytest.raises(InputError, match="C_Lalpha"):
         BuiltinModel(load_vehicle("reference-evtol"), ("C_Lalpa",))
+
+
+def test_intervals_hold_more_than_sampling_and_residuals_are_those_of_q2(folder: Path) -> None:
+    with xr.open_dataset(folder / "surrogates.nc", engine="h5netcdf") as data:
+        kept = data.load()
+    for name, block in results(folder)["responses"].items():
+        rows = block["sobol"].values()
+        assert all(row["ST_ci"][0] <= row["ST_ci_sampling"][0] <= row["ST_ci_sampling"][1] <= row["ST_ci"][1] for row in rows)
+        assert any(row["ST_ci"] != row["ST_ci_sampling"] for row in rows)
+        value, residual = (kept[key].sel(response=name).values for key in ("value", "loo_residual"))
+        lost = np.nansum(residual**2) / np.nansum((value - np.nanmean(value)) ** 2)
+        assert 1.0 - lost == pytest.approx(block["surrogate"]["q2"], abs=1e-9)
