@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from levelone.campaign import build_model
 from levelone.campaign.dakota import compare, execute
 from levelone.campaign.dakota.execute import find_dakota
-from levelone.campaign.models import RESPONSES
+from levelone.campaign.models.builtin import RESPONSES
 from levelone.config.study_file import load_study
 from levelone.dakota_command import dakota_app
 from levelone.errors import InputError

@@ -24,8 +24,8 @@ from levelone._version import __version__
 
 if TYPE_CHECKING:
     from levelone.campaign import run_study as run_study
-    from levelone.campaign.models import BuiltinModel as BuiltinModel
-    from levelone.campaign.models import Model as Model
+    from levelone.campaign.models.builtin import BuiltinModel as BuiltinModel
+    from levelone.campaign.models.protocol import Model as Model
     from levelone.config.study_file import Study as Study
     from levelone.config.study_file import load_study as load_study
     from levelone.config.vehicle_file import load_vehicle as load_vehicle
@@ -68,7 +68,8 @@ if TYPE_CHECKING:
 
 _HOME = {
     "levelone.campaign": ("run_study",),
-    "levelone.campaign.models": ("BuiltinModel", "Model"),
+    "levelone.campaign.models.builtin": ("BuiltinModel",),
+    "levelone.campaign.models.protocol": ("Model",),
     "levelone.config.study_file": ("Study", "load_study"),
     "levelone.config.vehicle_file": ("load_vehicle",),
     "levelone.dynamics": ("linearize", "simulate", "trim"),

@@ -131,7 +131,7 @@ def calibrate(
 ) -> None:
     """Fit unpublished parameters of a vehicle to nominal handling qualities."""
     from levelone.campaign.calibration_run import run_calibration
-    from levelone.campaign.models import RESPONSES
+    from levelone.campaign.models.builtin import RESPONSES
     from levelone.config.calibration_file import load_calibration
 
     checked = load_calibration(file, {name: unit for name, (unit, _) in RESPONSES.items()})

@@ -19,6 +19,10 @@ class Status(IntEnum):
     TABLE_EXCEEDED = 3
     LINEARISATION_FAILED = 4
     MODEL_FAILED = 5
+    TIMED_OUT = 6
+    CRASHED = 7
+    OUTPUT_MISSING = 8
+    OUTPUT_NOT_FINITE = 9
     # the measurement on a time history
     NO_FIRST_PEAK = 20
     NO_SECOND_STATIONARY_POINT = 21
@@ -67,6 +71,10 @@ _TEXT = {
     Status.TABLE_EXCEEDED: "the run left the range of the rotor or aerodynamic tables: extend the tables or reduce the speed",
     Status.LINEARISATION_FAILED: "the linearisation is not finite, or its derivatives change at half the step",
     Status.MODEL_FAILED: "the model returned no value",
+    Status.TIMED_OUT: "the model did not answer within its time limit and was ended",
+    Status.CRASHED: "the process of the model ended before it answered (crash or signal)",
+    Status.OUTPUT_MISSING: "the model answered without this response or channel",
+    Status.OUTPUT_NOT_FINITE: "the model answered with a number that is not finite",
     Status.NO_FIRST_PEAK: "no first peak of the rate after the input: the response is not oscillatory or the record ends too early",
     Status.NO_SECOND_STATIONARY_POINT: "the rate has no second stationary point after the input",
     Status.NO_VALLEY: "the rate has no valley after its first free peak: well damped beyond what a peak ratio can measure",

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from levelone.campaign import calibration as fitting
 from levelone.campaign.calibration import Fit, differentiate, fit, fly, from_sigmas, rounded, sigmas, starts_of
 from levelone.campaign.calibration_run import run_calibration
-from levelone.campaign.models import RESPONSES
+from levelone.campaign.models.builtin import RESPONSES
 from levelone.campaign.study import build_model
 from levelone.campaign.tradeoff import ORDINARY, cases_of
 from levelone.config.calibration_file import Calibration, load_calibration

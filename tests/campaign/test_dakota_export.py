@@ -15,7 +15,7 @@ from levelone.campaign.dakota.execute import run_dakota
 from levelone.campaign.dakota.export import export_plan, plan_of
 from levelone.campaign.dakota.tabular import read_tabular
 from levelone.campaign.dakota.variables import ordered, variables_block
-from levelone.campaign.models import RESPONSES
+from levelone.campaign.models.builtin import RESPONSES
 from levelone.errors import InputError
 from levelone.uncertainty import Discrete, Factor, FactorSpace, Normal, TruncatedNormal, Uniform
 from levelone.uncertainty.evidence import Evidence

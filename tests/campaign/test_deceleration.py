@@ -16,7 +16,7 @@ from scipy.stats import spearmanr
 from levelone.campaign import BuiltinModel, build_model
 from levelone.campaign.deceleration import DECOMPOSED, deceleration_section, group_name
 from levelone.campaign.deceleration_flights import KEPT, PERFORMANCE_KEYS, THINNED, Flights, assess, fly
-from levelone.campaign.models import Assessment
+from levelone.campaign.models.builtin import Assessment
 from levelone.campaign.store import write_groups, write_json
 from levelone.config.study_file import Study
 from levelone.config.study_sections import Deceleration

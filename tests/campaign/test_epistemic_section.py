@@ -18,7 +18,7 @@ from levelone.campaign.epistemic import epistemic_section
 from levelone.campaign.epistemic_search import nested_of
 from levelone.campaign.epistemic_statistics import Readings, thresholds_over
 from levelone.campaign.froude import judged
-from levelone.campaign.models import CRITERIA, RESPONSES, Assessment, BuiltinModel
+from levelone.campaign.models.builtin import CRITERIA, RESPONSES, Assessment, BuiltinModel
 from levelone.campaign.sampling import Sampled
 from levelone.campaign.sections import run_sections
 from levelone.config.epistemic_table import Epistemic

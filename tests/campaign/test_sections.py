@@ -13,7 +13,7 @@ from levelone.campaign.cases import cases_section
 from levelone.campaign.coupling import NO_PATH, coupling_section, relative
 from levelone.campaign.delay import delay_section
 from levelone.campaign.froude import froude_section, judged
-from levelone.campaign.models import CRITERIA, RESPONSES
+from levelone.campaign.models.builtin import CRITERIA, RESPONSES
 from levelone.config.study_file import Study
 from levelone.config.study_sections import Cases, Coupling, Froude
 from levelone.handling.froude import froude_scaled

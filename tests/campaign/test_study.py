@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 
 from levelone.campaign import BuiltinModel, build_model, run_study
-from levelone.campaign.models import CRITERIA, RESPONSES
+from levelone.campaign.models.builtin import CRITERIA, RESPONSES
 from levelone.config.study_file import Study
 from levelone.config.vehicle_file import load_vehicle
 from levelone.errors import InputError

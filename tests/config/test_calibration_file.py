@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from levelone.campaign.models import RESPONSES
+from levelone.campaign.models.builtin import RESPONSES
 from levelone.config.calibration_file import load_calibration
 from levelone.config.calibration_schema import CalibrationFile
 from levelone.config.schema import Strict

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from levelone.campaign.models import Assessment
+from levelone.campaign.models.builtin import Assessment
 from levelone.handling.levels import Level
 from levelone.status import Status
 from levelone.uncertainty import (

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from levelone.campaign.models import BuiltinModel, responses_of
+from levelone.campaign.models.builtin import BuiltinModel, responses_of
 from levelone.dynamics.simulate import chunks, threads_of
 from levelone.handling.damping import dynamic_stability
 from levelone.handling.manoeuvres import Manoeuvre

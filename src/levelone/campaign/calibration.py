@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from levelone.campaign.models import RESPONSES, BuiltinModel
+from levelone.campaign.models.builtin import RESPONSES, BuiltinModel
 from levelone.config.calibration_file import Calibration
 from levelone.config.calibration_sections import Parameter
 from levelone.config.vehicle_file import load_vehicle

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from levelone.campaign.analysis import in_words
-from levelone.campaign.models import BuiltinModel
+from levelone.campaign.models.builtin import BuiltinModel
 from levelone.campaign.study import Progress
 from levelone.config.calibration_file import Calibration
 from levelone.config.vehicle_file import load_vehicle

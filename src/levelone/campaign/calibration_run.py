@@ -21,7 +21,7 @@ from levelone._version import __version__
 from levelone.campaign.calibration import CLOSENESS, STEP, UNDEFINED, Fit, differentiate, fit, fly, rounded, starts_of
 from levelone.campaign.calibration_checks import checks_json
 from levelone.campaign.calibration_summary import describe_calibration, fit_json, identifiability_json, reached_json
-from levelone.campaign.models import BuiltinModel
+from levelone.campaign.models.builtin import BuiltinModel
 from levelone.campaign.store import prepare_folder, write_json
 from levelone.campaign.study import Progress, build_model
 from levelone.campaign.tradeoff import Case, cases_of, tradeoff_json

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from levelone.campaign.models import BuiltinModel
+from levelone.campaign.models.builtin import BuiltinModel
 from levelone.campaign.sweep import SweepCheck, sweep_check
 from levelone.config.study_file import Study
 from levelone.config.study_sections import Cases

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from levelone._version import __version__
 from levelone.campaign.describe import provenance_hashes
-from levelone.campaign.models import RESPONSES, Assessment, BuiltinModel
+from levelone.campaign.models.builtin import RESPONSES, Assessment, BuiltinModel
 from levelone.campaign.sweep import SweepCheck, sweep_check
 from levelone.config.study_file import Study
 from levelone.config.vehicle_file import load_fine_table, with_table

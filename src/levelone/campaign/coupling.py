@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from levelone.campaign import analysis
-from levelone.campaign.models import CHUNK, BuiltinModel, IntArray
+from levelone.campaign.models.builtin import CHUNK, BuiltinModel, IntArray
 from levelone.config.study_file import Study
 from levelone.dynamics.simulate import chunks
 from levelone.errors import InputError

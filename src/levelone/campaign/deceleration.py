@@ -13,7 +13,7 @@ from levelone.campaign import analysis
 from levelone.campaign.analysis import LEVEL_KEYS, Json
 from levelone.campaign.checks import reach
 from levelone.campaign.deceleration_flights import PERFORMANCE_KEYS, Flights, assess, history_group, measured_dataset
-from levelone.campaign.models import Assessment, BuiltinModel, IntArray
+from levelone.campaign.models.builtin import Assessment, BuiltinModel, IntArray
 from levelone.config.study_file import Study
 from levelone.config.study_sections import Deceleration
 from levelone.errors import InputError

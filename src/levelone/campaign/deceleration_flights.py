@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from levelone.campaign.models import CHUNK, BuiltinModel, IntArray, doubted
+from levelone.campaign.models.builtin import CHUNK, BuiltinModel, IntArray, doubted
 from levelone.campaign.store import history_dataset
 from levelone.config.manoeuvres import held_trim
 from levelone.config.study_sections import Deceleration

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from levelone.campaign import analysis
-from levelone.campaign.models import CHUNK, RESPONSES, BuiltinModel, responses_of
+from levelone.campaign.models.builtin import CHUNK, RESPONSES, BuiltinModel, responses_of
 from levelone.config.study_file import Study
 from levelone.dynamics.simulate import chunks
 from levelone.uncertainty import Design, Responses

@@ -9,7 +9,7 @@ import numpy as np
 
 from levelone.campaign.analysis import LEVEL_KEYS, Json
 from levelone.campaign.epistemic_search import Found, Nested, find, nested_of
-from levelone.campaign.models import CRITERIA, RESPONSES, Assessment, BuiltinModel
+from levelone.campaign.models.builtin import CRITERIA, RESPONSES, Assessment, BuiltinModel
 from levelone.config.study_file import Study
 from levelone.handling.levels import Level
 from levelone.uncertainty import Kriging

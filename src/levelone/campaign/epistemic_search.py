@@ -9,7 +9,7 @@ import numpy as np
 
 from levelone.campaign.epistemic_statistics import Readings, thresholds_over
 from levelone.campaign.froude import judged
-from levelone.campaign.models import BuiltinModel, IntArray
+from levelone.campaign.models.builtin import BuiltinModel, IntArray
 from levelone.config.study_file import Study
 from levelone.errors import InputError
 from levelone.uncertainty import FactorSpace, Kriging, Responses, latin_hypercube, stage_seed

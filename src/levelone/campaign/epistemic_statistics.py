@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from levelone.campaign.analysis import LEVEL_KEYS
-from levelone.campaign.models import CRITERIA, IntArray
+from levelone.campaign.models.builtin import CRITERIA, IntArray
 from levelone.uncertainty.probability_box import cumulative_shares
 from levelone.vehicle.tables import FloatArray
 

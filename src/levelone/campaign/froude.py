@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from levelone.campaign import analysis
-from levelone.campaign.models import Assessment, IntArray
+from levelone.campaign.models.builtin import Assessment, IntArray
 from levelone.config.study_file import Study
 from levelone.errors import InputError
 from levelone.handling.froude import froude_scaled, rate_scale

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from levelone.campaign.models import BuiltinModel
+from levelone.campaign.models.builtin import BuiltinModel
 from levelone.campaign.store import history_dataset
 from levelone.campaign.sweep import SweepCheck
 from levelone.handling.damping import DynamicStability

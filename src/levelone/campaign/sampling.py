@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from levelone.campaign import analysis
-from levelone.campaign.models import RESPONSES, Assessment, BuiltinModel
+from levelone.campaign.models.builtin import RESPONSES, Assessment, BuiltinModel
 from levelone.config.study_file import Study
 from levelone.status import Status
 from levelone.uncertainty import Design, Responses, latin_hypercube, morris_design, sobol_design, stage_seed

@@ -15,7 +15,7 @@ from levelone.campaign.deceleration import deceleration_section
 from levelone.campaign.delay import delay_section
 from levelone.campaign.epistemic import epistemic_section
 from levelone.campaign.froude import froude_section
-from levelone.campaign.models import BuiltinModel
+from levelone.campaign.models.builtin import BuiltinModel
 from levelone.campaign.sampling import Sampled
 from levelone.config.study_file import Study
 

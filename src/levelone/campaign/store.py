@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from levelone.campaign.models import CRITERIA, Assessment
+from levelone.campaign.models.builtin import CRITERIA, Assessment
 from levelone.errors import InputError
 from levelone.handling.history import TimeHistory
 from levelone.status import Status

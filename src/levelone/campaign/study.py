@@ -12,7 +12,7 @@ from levelone.campaign.checks import confidences, numerics, provenance, validity
 from levelone.campaign.compare import take_along
 from levelone.campaign.describe import describe_study
 from levelone.campaign.measures import measures_section
-from levelone.campaign.models import BuiltinModel
+from levelone.campaign.models.builtin import BuiltinModel
 from levelone.campaign.pictures import frequency_groups, history_groups
 from levelone.campaign.sampling import Clock, Progress, Sampled, response_results, sample_study
 from levelone.campaign.sections import Sections, run_sections

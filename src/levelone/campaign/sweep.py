@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from levelone.campaign.models import BuiltinModel
+from levelone.campaign.models.builtin import BuiltinModel
 from levelone.dynamics import LinearModel, linearize, simulate
 from levelone.handling.bandwidth import Bandwidth, bandwidth
 from levelone.handling.frequency import FrequencyResponse

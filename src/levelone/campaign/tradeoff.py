@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from levelone.campaign.calibration import Fit, fit, rounded
-from levelone.campaign.models import BuiltinModel
+from levelone.campaign.models.builtin import BuiltinModel
 from levelone.config.calibration_file import Calibration
 from levelone.config.calibration_sections import Tradeoff
 from levelone.vehicle.tables import FloatArray

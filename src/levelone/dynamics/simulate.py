@@ -104,9 +104,12 @@ def check_before_flight(batch: VehicleBatch, manoeuvre: Manoeuvre) -> None:
     Raises
     ------
     InputError
-        A delay longer than the buffer, a controller rate that is not the vehicle's, a speed beyond the rotor table.
+        A flight mode that the controller does not have, a delay longer than the buffer, a controller rate that is not the
+        vehicle's, a speed beyond the rotor table.
     """
     controller = batch.nominal.controller
+    if manoeuvre.flight_mode not in MODES:
+        raise unknown_name("manoeuvre.flight_mode", manoeuvre.flight_mode, MODES)
     if abs(manoeuvre.controller_rate / controller.rate - 1.0) > 1e-9:
         raise InputError(
             "manoeuvre.controller_rate",

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from levelone.errors import InputError, unknown_name
 from levelone.handling.history import FloatArray
 
-FlightMode = Literal["rate", "attitude", "velocity", "position"]
-Axis = Literal["V_lon", "V_lat", "V_vert", "yaw_rate", "theta", "phi", "q", "p"]
+FlightMode = Literal["rate", "attitude", "velocity", "position", "direct"]
+Axis = Literal["V_lon", "V_lat", "V_vert", "yaw_rate", "theta", "phi", "q", "p", "delta_lon", "delta_lat", "delta_col", "delta_ped"]
 Shape = Literal["step", "pulse", "sweep", "none"]
 Start = Literal["own trim", "design trim"]
 """From which trim a vehicle begins: its own, or that of the vehicle for which its controller was designed."""
@@ -27,8 +27,9 @@ UNITS = {
     "phi": "rad",
     "q": "rad/s",
     "p": "rad/s",
+    **dict.fromkeys(("delta_lon", "delta_lat", "delta_col", "delta_ped"), "1"),
 }
-"""Unit of the amplitude on each axis."""
+"""Unit of the amplitude on each axis; a pilot's controls ``delta_*`` run from -1 to 1, positive nose up, right, up and right."""
 
 _VELOCITIES = ("V_lon", "V_lat", "V_vert", "yaw_rate")
 MODE_AXES: dict[str, tuple[str, ...]] = {
@@ -36,8 +37,10 @@ MODE_AXES: dict[str, tuple[str, ...]] = {
     "attitude": ("theta", "phi", "yaw_rate", "V_vert"),
     "velocity": _VELOCITIES,
     "position": _VELOCITIES,
+    "direct": ("delta_lon", "delta_lat", "delta_col", "delta_ped"),
 }
-"""Axes that a command can move in each flight mode. In ``position`` a velocity moves the position that is held."""
+"""Axes that a command can move in each flight mode. In ``position`` a velocity moves the position that is held.
+In ``direct`` a pilot's control reaches the model as it is, which models other than the built-in vehicle have."""
 
 # Ticks and input times are sums of decimals: equal to the reader, not always to the last bit.
 _SAME_TIME = 1e-9
@@ -52,7 +55,8 @@ class Manoeuvre:
     name
         Free text.
     flight_mode
-        ``"rate"``, ``"attitude"``, ``"velocity"`` (ground speed in the heading frame, altitude held) or ``"position"``.
+        ``"rate"``, ``"attitude"``, ``"velocity"`` (ground speed in the heading frame, altitude held), ``"position"`` or
+        ``"direct"``.
     axis
         Command that is moved: see :data:`MODE_AXES`.
     trim_speed, trim_climb

@@ -14,7 +14,7 @@ import xarray as xr
 
 from levelone.campaign.claims.decision import Undecided
 from levelone.campaign.claims.inputs import other_inputs
-from levelone.campaign.models import Assessment, IntArray
+from levelone.campaign.models.builtin import Assessment, IntArray
 from levelone.errors import InputError
 from levelone.handling.levels import Level
 from levelone.uncertainty import Design, bounding_values

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from levelone.campaign.dakota.parameters import Evaluation, read_parameters
-from levelone.campaign.models import Model
+from levelone.campaign.models.builtin import BuiltinModel
+from levelone.campaign.models.protocol import Model
 from levelone.errors import InputError, closest, unknown_name
 from levelone.uncertainty import FactorSpace
 from levelone.uncertainty.distributions import FloatArray
@@ -17,7 +18,7 @@ from levelone.uncertainty.distributions import FloatArray
 VALUE = 1
 
 
-def drive(space: FactorSpace, model: Model, parameters: Path, results: Path) -> tuple[int, int]:
+def drive(space: FactorSpace, model: BuiltinModel | Model, parameters: Path, results: Path) -> tuple[int, int]:
     """Answer a parameters file: read it, fly what it asks for, write the results file in one move.
 
     Parameters

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from levelone.campaign.dakota.variables import check_expressible, check_label, quoted, variables_block
-from levelone.campaign.models import RESPONSES
+from levelone.campaign.models.builtin import RESPONSES
 from levelone.config.study_file import Study
 from levelone.errors import InputError, unknown_name
 from levelone.uncertainty import FactorSpace, Uniform, stage_seed

@@ -10,7 +10,7 @@ import numpy as np
 
 from levelone.campaign.dakota.printed import PrintedIndices
 from levelone.campaign.dakota.tabular import Imported, imported
-from levelone.campaign.models import RESPONSES
+from levelone.campaign.models.builtin import RESPONSES
 from levelone.errors import InputError, unknown_name
 from levelone.uncertainty import FactorSpace
 from levelone.uncertainty.distributions import FloatArray

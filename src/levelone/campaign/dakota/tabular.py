@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from levelone.campaign.dakota.printed import PrintedIndices
-from levelone.campaign.models import RESPONSES
+from levelone.campaign.models.builtin import RESPONSES
 from levelone.errors import InputError, closest
 from levelone.uncertainty import FactorSpace, Responses
 from levelone.uncertainty.distributions import FloatArray

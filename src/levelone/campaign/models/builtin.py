@@ -1,11 +1,10 @@
-"""Models that a study can evaluate. The built-in vehicle is one of them: points of the factor box in, handling qualities out."""
+"""The built-in vehicle under the manoeuvres of a study: points of the factor box in, handling qualities out, in whole batches."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -45,17 +44,6 @@ RESPONSES = {
 CRITERIA = ("attitude_quickness", "dynamic_stability", "bandwidth", "worst", "translational_rate")
 CHANNELS = ("q", "theta", "V_lon")
 CHUNK = 64
-
-
-class Model(Protocol):
-    """Anything that maps points of a factor space to responses."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the responses."""
-
-    def evaluate(self, points: FloatArray) -> Responses:
-        """Responses at ``points`` [n, factors]; a failed run is NaN with a status."""
 
 
 @dataclass(frozen=True)
