@@ -22,9 +22,30 @@ def test_folder_is_named_by_the_sources(monkeypatch: pytest.MonkeyPatch, tmp_pat
     """Another file of kernels, another folder: Numba itself would go on using the old code of their callers."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     before = compiled.cache_folder.__wrapped__(("dynamics", "handling", "vehicle"))
-    after = compiled.cache_folder.__wrapped__(("dynamics", "handling"))
+    after = compiled.cache_folder.__wrapped__(("aerodynamics",))
     assert before != after
     assert str(tmp_path) in str(before)
+
+
+@pytest.mark.parametrize("folders", compiled.GROUPS)
+def test_sources_are_all_that_kernels_load(folders: tuple[str, ...]) -> None:
+    """What Python itself loads for the files with kernels: a constant in any of it may be part of the machine code."""
+    root = Path(compiled.__file__).parent
+    sources = compiled.kernel_sources(folders)
+    kernels = [path for path in sources if "levelone.compiled import" in path.read_text()]
+    modules = ["levelone." + ".".join(path.relative_to(root).with_suffix("").parts) for path in kernels]
+    code = f"import sys, {', '.join(modules)}; print(*[m.__file__ for n, m in sys.modules.items() if n.startswith('levelone.')])"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert len(kernels) >= 4
+    assert {Path(path) for path in loaded} - {root / "_version.py"} <= set(sources)
+
+
+def test_other_files_leave_machine_code_as_it_is() -> None:
+    """A criterion without kernels is no reason to compile the flight model again."""
+    names = {path.name for path in compiled.kernel_sources(("dynamics", "handling", "vehicle"))}
+    assert "integrate.py" in names
+    assert "status.py" in names
+    assert "identification.py" not in names
 
 
 def test_parts_that_do_not_call_each_other_keep_their_code_apart() -> None:
