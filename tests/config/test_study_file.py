@@ -239,7 +239,11 @@ FAULTS = [
         "method.base_points: 16000 is not a power of two; the nearest are 8192 and 16384",
     ),
     ('kernel = "likeliest"', 'kernel = "matern"', "method.kernel: 'matern' is not among the choices; did you mean 'matern52'?"),
-    ('boundaries = "ads33-levels"', 'boundaries = "ads33"', "boundaries: unknown name 'ads33'; did you mean 'ads33-levels'?"),
+    (
+        'boundaries = "ads33-levels"',
+        'boundaries = "ads33-level"',
+        "boundaries: unknown name 'ads33-level'; did you mean 'ads33-levels'?",
+    ),
     ('boundaries = "ads33-levels"', 'boundaries = "none.toml"', "none.toml: cannot be read"),
     ('task = "all_other"', 'task = "all_others"', "bandwidth: unknown name 'all_others'; did you mean 'all_other'?"),
     ("[method]", "[methods]", "unknown name 'methods'; did you mean 'method'?"),

@@ -187,7 +187,7 @@ def test_change_is_counted_from_trim():
         ({"input_off": 0.5}, "must come after"),
         ({"delay": np.array([0.0])}, r"delay: has shape \(1,\)"),
         ({"delay": np.array([0.0, -0.1])}, "zero or more"),
-        ({"status": np.array([0, 7])}, "7 is not a code"),
+        ({"status": np.array([0, 17])}, "17 is not a code"),
         ({"extremes": {"alpha_max": np.zeros(3)}}, r"extremes.alpha_max: has shape \(3,\)"),
     ],
 )

@@ -18,10 +18,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
-from scipy import signal
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy import fft, signal
 
 from levelone.errors import InputError, unknown_name
 from levelone.handling.axes import run_failures
@@ -31,7 +32,37 @@ from levelone.handling.history import FloatArray, TimeHistory
 WINDOWS = (0.6, 0.4, 0.2)
 """Window lengths taken by default, as parts of the record."""
 TAPERS = ("hann", "hamming", "blackman", "nuttall", "cosine", "boxcar")
-_Spectra = tuple[FloatArray, FloatArray, ComplexArray]
+Spectra = tuple[FloatArray, FloatArray, ComplexArray]
+"""Auto spectra of input and output and cross spectrum, summed over the segments of one window length."""
+
+
+@dataclass(frozen=True, eq=False)
+class Segmentation:
+    """How records are cut into segments, and at which frequencies their spectra are read.
+
+    Parameters
+    ----------
+    rate
+        1/s, samples a second.
+    counts
+        Samples of each window.
+    overlap, taper
+        Fraction of a window shared with the next, and its taper.
+    transform
+        Samples of the transform, padded by zeros.
+    kept
+        Frequencies of the transform that are read.
+    omega
+        ``[frequency]``, rad/s: those that are read.
+    """
+
+    rate: float
+    counts: tuple[int, ...]
+    overlap: float
+    taper: str
+    transform: int
+    kept: slice
+    omega: FloatArray
 
 
 def identify(
@@ -75,62 +106,95 @@ def identify(
 
     Notes
     -----
-    A run that failed, or holds values that are not finite, is NaN at every frequency.
+    A run that failed, or holds values that are not finite, is NaN at every frequency. Several records of one kind are
+    taken together by :func:`levelone.handling.joint_identification.identify_records`.
     """
-    lengths = _checked(history, windows, overlap, taper, sign)
-    source = history.change(history.input_name if input_name is None else input_name)
-    answer = sign * history.change(output)
-    rate = 1.0 / history.dt
-    samples = [max(round(length * rate), 8) for length in lengths]
-    transform = 2 ** math.ceil(math.log2(2 * max(samples)))
-    omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(transform, history.dt), dtype=np.float64)
-    inside = (omega >= omega_min) & (omega <= omega_max)
-    if not omega_min > 0.0 or not inside.any():
-        raise InputError("omega_min", f"no frequency between {omega_min} and {omega_max} rad/s; both must be positive")
-    value = np.full((history.n_runs, int(inside.sum())), np.nan + 0j)
+    plan = segmentation([history], windows, overlap, taper, omega_min, omega_max)
+    source, answer = input_and_output(history, output, input_name, sign)
+    value = np.full((history.n_runs, plan.omega.size), np.nan + 0j)
     coherence = np.full(value.shape, np.nan)
     failures = run_failures(history)
     for run in range(history.n_runs):
         x, y = source[run], answer[run]
         if failures[run] or not (np.isfinite(x).all() and np.isfinite(y).all()):
             continue
-        spectra = [_spectra(x, y, rate, count, overlap, taper, transform, inside) for count in samples]
-        value[run], coherence[run] = _composite(spectra, [x.size / count for count in samples])
-    return FrequencyResponse(omega[inside], value, coherence)
+        spectra = record_spectra(x, y, plan)
+        value[run], coherence[run], _ = composite(spectra, [x.size / count for count in plan.counts])
+    return FrequencyResponse(plan.omega, value, coherence)
 
 
-def _spectra(
-    x: FloatArray,
-    y: FloatArray,
-    rate: float,
-    count: int,
+def input_and_output(history: TimeHistory, output: str, input_name: str | None, sign: int) -> tuple[FloatArray, FloatArray]:
+    """Changes from trim of the input and of the signed output, ``[run, time]`` each; a heading ``psi`` may wrap.
+
+    Raises
+    ------
+    InputError
+        An unknown channel, or a sign other than 1 and -1.
+    """
+    if sign not in (-1, 1):
+        raise InputError("sign", f"is {sign}, must be 1 or -1")
+    source = history.change(history.input_name if input_name is None else input_name)
+    answer = history.change(output)
+    if output == "psi":  # a heading may be recorded within half a turn
+        with np.errstate(invalid="ignore"):
+            answer = np.unwrap(answer, axis=1)
+            answer -= 2.0 * np.pi * np.round(answer[:, :1] / (2.0 * np.pi))
+    return source, sign * answer
+
+
+def segmentation(
+    histories: Sequence[TimeHistory],
+    windows: float | Sequence[float] | None,
     overlap: float,
     taper: str,
-    transform: int,
-    inside: np.ndarray,
-) -> _Spectra:
-    """Auto spectra of input and output and cross spectrum, for one window length of ``count`` samples."""
-    x, y = np.pad(x, count), np.pad(y, count)
-    shared = min(round(overlap * count), count - 1)
-    options: dict[str, Any] = {
-        "fs": rate,
-        "window": taper,
-        "nperseg": count,
-        "noverlap": shared,
-        "nfft": transform,
-        "detrend": False,
-    }
-    # SciPy averages over segments; the sum is wanted, so that windows of different length see the same energy
-    segments = (x.size - shared) // (count - shared)
-    energy = segments * (count - shared)
-    auto_x = signal.welch(x, **options)[1][inside] * energy
-    auto_y = signal.welch(y, **options)[1][inside] * energy
-    cross = signal.csd(x, y, **options)[1][inside] * energy
-    return auto_x, auto_y, cross
+    omega_min: float,
+    omega_max: float,
+) -> Segmentation:
+    """How records of one sampling interval are cut; windows must fit into the shortest of them.
+
+    Raises
+    ------
+    InputError
+        A window that does not fit, an overlap or taper that is not allowed, a range without a frequency.
+    """
+    lengths = _checked(histories, windows, overlap, taper)
+    dt = histories[0].dt
+    rate = 1.0 / dt
+    counts = tuple(max(round(length * rate), 8) for length in lengths)
+    transform = 2 ** math.ceil(math.log2(2 * max(counts)))
+    omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(transform, dt), dtype=np.float64)
+    kept = slice(int(np.searchsorted(omega, omega_min)), int(np.searchsorted(omega, omega_max, side="right")))
+    if not omega_min > 0.0 or not kept.start < kept.stop:
+        raise InputError("omega_min", f"no frequency between {omega_min} and {omega_max} rad/s; both must be positive")
+    return Segmentation(rate, counts, overlap, taper, transform, kept, omega[kept])
 
 
-def _composite(spectra: list[_Spectra], independent: list[float]) -> tuple[ComplexArray, FloatArray]:
-    """Response and coherence from the spectra of all window lengths, each with its number of independent segments."""
+def record_spectra(x: FloatArray, y: FloatArray, plan: Segmentation) -> list[Spectra]:
+    """Spectra of one record, ``[time]`` each, for every window length; several records add up."""
+    return [_spectra(x, y, plan, count) for count in plan.counts]
+
+
+def _spectra(x: FloatArray, y: FloatArray, plan: Segmentation, count: int) -> Spectra:
+    shared = min(round(plan.overlap * count), count - 1)
+    step = count - shared
+    segments = (x.size + 2 * count - shared) // step
+    window = signal.ShortTimeFFT(signal.get_window(plan.taper, count), step, plan.rate, scale_to="psd").win
+    source, answer = (
+        fft.rfft(sliding_window_view(np.pad(series, count), count)[::step] * window, n=plan.transform)[:, : plan.kept.stop].T.copy()
+        for series in (x, y)
+    )
+    # one-sided; the sum over segments is wanted, not their mean, so that windows of different length see the same energy
+    energy = segments * step
+    auto_x, auto_y = (2.0 * (each.real**2 + each.imag**2).mean(axis=-1) * energy for each in (source, answer))
+    cross = 2.0 * (source.conj() * answer).mean(axis=-1) * energy
+    return auto_x[plan.kept], auto_y[plan.kept], cross[plan.kept]
+
+
+def composite(spectra: list[Spectra], independent: list[float]) -> tuple[ComplexArray, FloatArray, FloatArray]:
+    """Response, coherence and weights ``[window, frequency]`` (their sum is 1) from the spectra of all window lengths.
+
+    ``independent`` is the number of segments of each length that would fit side by side.
+    """
     coherences = [_coherence(*each) for each in spectra]
     errors = [
         np.sqrt(np.maximum(1.0 - gamma2, 1e-12)) / np.sqrt(np.maximum(gamma2, 1e-12) * 2.0 * count)
@@ -145,7 +209,7 @@ def _composite(spectra: list[_Spectra], independent: list[float]) -> tuple[Compl
     excited = auto_x > 1e-12 * auto_x.max()
     value = np.full(cross.shape, np.nan + 0j)
     value[excited] = cross[excited] / auto_x[excited]
-    return value, np.where(excited, _coherence(auto_x, auto_y, cross), np.nan)
+    return value, np.where(excited, _coherence(auto_x, auto_y, cross), np.nan), np.asarray(weights) / total
 
 
 def _coherence(auto_x: FloatArray, auto_y: FloatArray, cross: ComplexArray) -> FloatArray:
@@ -155,8 +219,8 @@ def _coherence(auto_x: FloatArray, auto_y: FloatArray, cross: ComplexArray) -> F
     return np.clip(gamma2, 0.0, 1.0)
 
 
-def _checked(history: TimeHistory, windows: float | Sequence[float] | None, overlap: float, taper: str, sign: int) -> list[float]:
-    duration = float(history.time[-1] - history.time[0])
+def _checked(histories: Sequence[TimeHistory], windows: float | Sequence[float] | None, overlap: float, taper: str) -> list[float]:
+    duration = min(float(history.time[-1] - history.time[0]) for history in histories)
     given = [part * duration for part in WINDOWS] if windows is None else windows
     lengths = [float(length) for length in np.atleast_1d(np.asarray(given, dtype=np.float64))]
     for length in lengths:
@@ -166,6 +230,4 @@ def _checked(history: TimeHistory, windows: float | Sequence[float] | None, over
         raise InputError("overlap", f"is {overlap}, must lie between 0.5 and 0.98")
     if taper not in TAPERS:
         raise unknown_name("taper", taper, TAPERS)
-    if sign not in (-1, 1):
-        raise InputError("sign", f"is {sign}, must be 1 or -1")
     return lengths

@@ -24,6 +24,7 @@ from levelone.handling.history import FloatArray, IntArray
 
 Confidence = Literal["high", "medium", "low"]
 DEFAULT = "ads33-levels"
+SHIPPED = (DEFAULT, "ads33-roll", "ads33-yaw")
 
 
 class Level(IntEnum):
@@ -183,7 +184,7 @@ def load_boundaries(path_or_name: str | PathLike[str] = DEFAULT) -> Boundaries:
     """
     where = str(path_or_name)
     folder = resources.files("levelone.handling").joinpath("library")
-    shipped = {item.name.removesuffix(".toml"): item for item in folder.iterdir() if item.name.endswith(".toml")}
+    shipped = {name: folder.joinpath(f"{name}.toml") for name in SHIPPED}
     if where not in shipped and not where.endswith(".toml"):
         raise unknown_name("boundaries", where, shipped)
     source = shipped[where] if where in shipped else Path(where)
