@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from levelone.campaign.models.builtin import CRITERIA, Assessment
+from levelone.campaign.models.builtin import Assessment
 from levelone.errors import InputError
 from levelone.handling.history import TimeHistory
 from levelone.status import Status
@@ -71,21 +71,22 @@ def sample_dataset(design: Design, assessed: Assessment) -> xr.Dataset:
     """Points, responses, statuses and Levels of a sample, labelled."""
     r = assessed.responses
     units = [factor.unit for factor in design.space.factors]
-    levels = np.stack([assessed.levels[name] for name in CRITERIA], axis=1)
+    levels = np.array([*assessed.levels.values()], dtype=np.int16).reshape(len(assessed.levels), len(r)).T
+    beyond = {} if assessed.extrapolated is None else {"extrapolated_level": (("run",), assessed.extrapolated.astype(np.int16))}
     return xr.Dataset(
         {
             "points": (("run", "factor"), design.points),
             "values": (("run", "response"), r.values),
             "status": (("run", "response"), r.status.astype(np.int16)),
-            "level": (("run", "criterion"), levels.astype(np.int16)),
-            "extrapolated_level": (("run",), assessed.extrapolated.astype(np.int16)),
+            "level": (("run", "criterion"), levels),
+            **beyond,
         },
         coords={
             "factor": list(design.names),
             "factor_unit": ("factor", units),
             "response": list(r.names),
             "response_unit": ("response", list(r.units)),
-            "criterion": list(CRITERIA),
+            "criterion": list(assessed.levels),
         },
         attrs={"design": str(design.kind), "status_codes": "; ".join(f"{int(s)}: {s.text}" for s in Status)},
     )
@@ -96,17 +97,17 @@ def write_sample(folder: Path, name: str, design: Design, assessed: Assessment) 
     data = sample_dataset(design, assessed)
     data.to_netcdf(folder / f"{name}.nc", engine=ENGINE, encoding=dict.fromkeys(data.data_vars, COMPRESSED))
     r = assessed.responses
-    header = [*design.names, *r.names, *(f"{n}_status" for n in r.names), *(f"level_{c}" for c in CRITERIA)]
+    header = [*design.names, *r.names, *(f"{n}_status" for n in r.names), *(f"level_{c}" for c in assessed.levels)]
     with (folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(header)
         for i in range(len(r)):
-            levels = [int(assessed.levels[c][i]) for c in CRITERIA]
+            levels = [int(codes[i]) for codes in assessed.levels.values()]
             texts = [Status(int(code)).name.lower() for code in r.status[i]]
             writer.writerow([*map(repr, design.points[i].tolist()), *map(repr, r.values[i].tolist()), *texts, *levels])
 
 
-def history_dataset(history: TimeHistory, names: tuple[str, ...], attrs: Mapping[str, float]) -> xr.Dataset:
+def history_dataset(history: TimeHistory, names: tuple[str, ...], attrs: Mapping[str, Any]) -> xr.Dataset:
     """Channels [run, time] of a record, with what was picked on its first run."""
     data = {name: (("run", "time"), history.channels[name]) for name in names}
     out = xr.Dataset(
