@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -12,7 +12,9 @@ from markupsafe import Markup
 from levelone.errors import InputError
 from levelone.report import style, svg, symbols
 from levelone.report.formatting import number, percent
-from levelone.report.pictures import Picture
+
+if TYPE_CHECKING:
+    from levelone.report.pictures import Picture
 
 Progress = Callable[[str, int, int], None]
 """Called with the stage's name, the steps done and the steps in all."""
