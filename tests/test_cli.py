@@ -20,6 +20,10 @@ from levelone.errors import InputError
 STUDY = Path(__file__).parents[1] / "studies" / "reference" / "study.toml"
 COMMANDS = (
     "run",
+    "check",
+    "status",
+    "export",
+    "assess",
     "compare",
     "decompose",
     "experiments",
@@ -170,7 +174,7 @@ def test_ctrl_c_and_errors_inside_the_study_end_with_one_line(monkeypatch, finis
         raise error
 
     monkeypatch.setattr("levelone.campaign.run_study", run_study)
-    monkeypatch.setattr("levelone.cli.announce_compilation", lambda: None)
+    monkeypatch.setattr("levelone.run_command.announce_compilation", lambda: None)
     done = call("run", STUDY, "--out", tmp_path / "out")
     assert done.exit_code == code
     assert done.stderr.strip().splitlines()[-1].startswith(text)
@@ -329,6 +333,8 @@ def test_help_tells_a_newcomer_what_to_do_next():
         "decompose",
         "calibrate",
         "derivatives",
+        "check",
+        "assess",
     }
     assert set(COMMANDS) <= {words[0] for words in shown if words}
     folder = next(words[0] for words in shown if words and words[0].endswith("library"))

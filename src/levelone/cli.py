@@ -8,6 +8,8 @@ from typing import Annotated, Literal
 import typer
 
 from levelone._version import __version__
+from levelone.assess_command import assess
+from levelone.check_command import check
 from levelone.console import (
     Commands,
     announce_compilation,
@@ -21,6 +23,8 @@ from levelone.console import (
 from levelone.dakota_command import dakota_app
 from levelone.decompose_command import decompose
 from levelone.derivatives_command import derivatives
+from levelone.run_command import run
+from levelone.store_commands import export, status
 
 EPILOG = f"""\b
 What to do next:
@@ -32,6 +36,8 @@ What to do next:
   levelone decompose studies/reference/study.toml the indices of the model itself, without a surrogate
   levelone calibrate studies/reference/calibration.toml   how the unpublished numbers were found
   levelone derivatives reference-wing-tail        aerodynamic derivatives of a geometry, against reduced frequency
+  levelone check studies/own-model/study.toml     a model of your own: does its nominal case look right?
+  levelone assess DATA.csv --columns ...          the criteria on recorded data
 
 \b
 Your own aircraft: copy reference-evtol.toml and its two tables, change the numbers, and give the path of your
@@ -65,34 +71,11 @@ def levelone(
     """Predicted handling qualities of VTOL aircraft from flight simulation models, and how far they can be trusted."""
 
 
-@app.command()
-def run(
-    study: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.")],
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of the results.  [default: results/NAME]")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="In place of the study's seed.")] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Worker threads; no influence on the results.")] = None,
-) -> None:
-    """Run a study and write its results and report."""
-    from levelone.config.study_file import load_study
-
-    checked = load_study(study)
-    from levelone.campaign import run_study
-    from levelone.campaign.compare import compare as decide
-    from levelone.campaign.compare import in_one_line
-    from levelone.campaign.store import prepare_folder
-    from levelone.dynamics.simulate import threads_of
-    from levelone.report import render_report
-
-    folder = prepare_folder(out if out is not None else Path("results") / checked.name)
-    announce_compilation()
-    with stage_bars() as progress:
-        results = run_study(checked, folder, seed=seed, threads=threads, progress=progress)
-    verdicts = in_one_line(decide(folder)) if checked.findings is not None else ""
-    page = render_report(folder, workers=min(threads_of(threads), 4))
-    say(f"results: {results}")
-    if checked.findings is not None:
-        say(f"findings: {verdicts}")
-    say(f"report:  {page}")
+app.command()(run)
+app.command()(check)
+app.command()(status)
+app.command()(export)
+app.command()(assess)
 
 
 @app.command()
@@ -149,6 +132,11 @@ def calibrate(
 @app.command()
 def report(directory: Annotated[Path, typer.Argument(metavar="DIR", help="Folder that a run has filled.")]) -> None:
     """Write the report of a finished study anew."""
+    from levelone.report.model_study import is_model_study, render_model_study
+
+    if is_model_study(directory):
+        say(f"report: {render_model_study(directory)}")
+        return
     from levelone.dynamics.simulate import threads_of
     from levelone.report import render_report
 

@@ -6,7 +6,7 @@ import csv
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,8 +18,9 @@ from levelone.errors import InputError, LeveloneError
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress, TaskID
 
-BAD_INPUT, INTERRUPTED = 2, 130
+INTERRUPTED = 130
 Columns = Mapping[str, Sequence[Any]]
 
 
@@ -31,8 +32,9 @@ class Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except LeveloneError as error:
-            say(f"error: {' '.join(str(error).split())}")
-            raise typer.Exit(BAD_INPUT) from None
+            interrupted = error.exit_code == INTERRUPTED
+            say(f"{'interrupted' if interrupted else 'error'}: {' '.join(str(error).split())}")
+            raise typer.Exit(error.exit_code) from None
         except KeyboardInterrupt:
             say("interrupted: what was not finished has not been written")
             raise typer.Exit(INTERRUPTED) from None
@@ -140,18 +142,37 @@ def announce_compilation(part: str = "dynamics") -> None:
         say("compiling the kernels (first run only, about half a minute) ...")
 
 
+class StageBars:
+    """Progress bars on stderr, one a stage; called with a stage's name, how much is done, and of how much."""
+
+    def __init__(self, bars: Progress) -> None:
+        self._bars = bars
+        self._tasks: dict[str, TaskID] = {}
+        self._last: TaskID | None = None
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        if stage not in self._tasks:
+            self._tasks[stage] = self._bars.add_task(stage, total=total, note="")
+        self._last = self._tasks[stage]
+        self._bars.update(self._last, completed=done, total=total)
+
+    def note(self, text: str) -> None:
+        """Say something behind the bar that moved last."""
+        if self._last is not None:
+            self._bars.update(self._last, note=text)
+
+
 @contextmanager
-def stage_bars() -> Iterator[Callable[[str, int, int], None]]:
-    """Progress bars on stderr, one a stage; gives the function that takes a stage's name, how much is done, and of how much."""
+def stage_bars() -> Iterator[StageBars]:
+    """Progress bars on stderr for as long as the block runs."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    columns = (TextColumn("{task.description:<24}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    columns = (
+        TextColumn("{task.description:<24}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[note]}"),
+    )
     with Progress(*columns, console=_console(stderr=True)) as bars:
-        tasks: dict[str, Any] = {}
-
-        def update(stage: str, done: int, total: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=total)
-            bars.update(tasks[stage], completed=done, total=total)
-
-        yield update
+        yield StageBars(bars)

@@ -11,7 +11,12 @@ from collections.abc import Iterable
 
 
 class LeveloneError(Exception):
-    """Base of every error that the package raises on purpose; its text is meant for the user."""
+    """Base of every error that the package raises on purpose; its text is meant for the user.
+
+    ``exit_code`` is that of the command which it ends: 2, or 130 where the user interrupted it.
+    """
+
+    exit_code = 2
 
 
 class InputError(LeveloneError, ValueError):

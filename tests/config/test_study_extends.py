@@ -293,9 +293,10 @@ def test_any_choice_of_entries_replaces_those_and_no_others(tmp_path_factory, ch
 
 
 def section(path):
-    """[study] of a file; files of calibrations and experiments have none."""
-    found = tomllib.loads(path.read_text(encoding="utf-8")).get("study", {})
-    return found if isinstance(found, dict) else {}
+    """[study] of a study of the built-in vehicle; files of calibrations and experiments have none."""
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    found = content.get("study", {})
+    return found if isinstance(found, dict) and "model" not in content else {}
 
 
 def shipped() -> list[Path]:

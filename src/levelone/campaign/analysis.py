@@ -191,6 +191,8 @@ def level_shares(assessed: Assessment) -> Json:
     """Share of samples at each Level, outside the requirement's range and failed, for each criterion and for the worst of them."""
     names = list(LEVEL_KEYS.values())
     out: Json = {criterion: shares_json(codes) for criterion, codes in assessed.levels.items()}
+    if assessed.extrapolated is None:
+        return out
     beyond = shares([LEVEL_KEYS[Level(int(code))] for code in assessed.extrapolated], names)
     kept: Sequence[str] = names[:3]
     out["attitude_quickness"]["extrapolated"] = {k: float(v) for k, v in zip(names, beyond.share, strict=True) if k in kept}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from levelone.config.model_study import ModelStudy
 from levelone.config.study_file import Study
 from levelone.config.vehicle_file import vehicle_hash
 from levelone.handling.manoeuvres import Manoeuvre
@@ -25,7 +26,7 @@ def describe_study(study: Study, seed: int) -> dict[str, Any]:
         "task": study.task,
         "notes": list(study.notes),
         "seed": seed,
-        "factors": [_factor(study, j) for j in range(len(study.space.factors))],
+        "factors": [describe_factor(study, j) for j in range(len(study.space.factors))],
         "correlations": [
             {"factors": [first, second], "rank": rank, "source": why} for first, second, rank, why in study.correlations
         ],
@@ -34,14 +35,15 @@ def describe_study(study: Study, seed: int) -> dict[str, Any]:
             "kernel": m.kernel, "trend": m.trend, "bootstrap": m.bootstrap,
         },
         "manoeuvres": {
-            "attitude_quickness": _manoeuvre(study.quickness),
-            "dynamic_stability": _manoeuvre(study.stability),
-            "bandwidth": _manoeuvre(study.sweep),
+            "attitude_quickness": describe_manoeuvre(study.quickness),
+            "dynamic_stability": describe_manoeuvre(study.stability),
+            "bandwidth": describe_manoeuvre(study.sweep),
         },
     }  # fmt: skip
 
 
-def _factor(study: Study, j: int) -> dict[str, Any]:
+def describe_factor(study: Study | ModelStudy, j: int) -> dict[str, Any]:
+    """One factor as results.json names it."""
     factor = study.space.factors[j]
     low, high = factor.distribution.support
     return {
@@ -50,7 +52,8 @@ def _factor(study: Study, j: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _manoeuvre(m: Manoeuvre) -> dict[str, Any]:
+def describe_manoeuvre(m: Manoeuvre) -> dict[str, Any]:
+    """One manoeuvre as results.json names it."""
     out: dict[str, Any] = {
         "axis": m.axis,
         "shape": m.shape,

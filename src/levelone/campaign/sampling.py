@@ -3,20 +3,44 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from levelone.campaign import analysis
-from levelone.campaign.models.builtin import RESPONSES, Assessment, BuiltinModel
-from levelone.config.study_file import Study
+from levelone.campaign.models.builtin import RESPONSES, Assessment
+from levelone.config.study_file import Method
 from levelone.status import Status
-from levelone.uncertainty import Design, Responses, latin_hypercube, morris_design, sobol_design, stage_seed
+from levelone.uncertainty import Design, FactorSpace, Responses, latin_hypercube, morris_design, sobol_design, stage_seed
+from levelone.uncertainty.distributions import FloatArray
+from levelone.uncertainty.failures import Policy
 
 Progress = Callable[[str, int, int], None]
+#: criterion of each response of the built-in vehicle
+CRITERION_OF = {name: criterion for name, (_, criterion) in RESPONSES.items()}
+
+
+class SampledStudy(Protocol):
+    """What sampling and analysis need to know of a study, of the built-in vehicle or of another model."""
+
+    @property
+    def space(self) -> FactorSpace: ...
+
+    @property
+    def method(self) -> Method: ...
+
+    @property
+    def policy(self) -> Policy: ...
+
+
+class Assessor(Protocol):
+    """Whatever judges a sample."""
+
+    def assess(self, points: FloatArray, progress: Callable[[int], None]) -> Assessment:
+        """Responses and Levels at ``points`` [n, factors]; ``progress`` is called with the number of runs done."""
 
 
 @dataclass
@@ -50,8 +74,8 @@ class Sampled:
 
 
 def sample_study(
-    study: Study,
-    model: BuiltinModel,
+    study: SampledStudy,
+    model: Assessor,
     nominal: Assessment,
     seed: int,
     threads: int | None,
@@ -79,7 +103,7 @@ def sample_study(
     return Sampled(nominal, screening, screened, sample, assessed, read, found)
 
 
-def _assess(model: BuiltinModel, design: Design, stage: str, progress: Progress) -> Assessment:
+def _assess(model: Assessor, design: Design, stage: str, progress: Progress) -> Assessment:
     progress(stage, 0, design.runs)
     return model.assess(design.points, lambda done: progress(stage, min(done, design.runs), design.runs))
 
@@ -92,18 +116,18 @@ def _only(assessed: Assessment, names: tuple[str, ...]) -> Assessment:
     return replace(assessed, responses=Responses(r.values[:, columns], r.status[:, columns], names, units))
 
 
-def response_results(study: Study, s: Sampled) -> dict[str, Any]:
-    """The block of each response in results.json, for those that were decomposed."""
+def response_results(study: SampledStudy, s: Sampled, criterion_of: Mapping[str, str] = CRITERION_OF) -> dict[str, Any]:
+    """The block of each response in results.json, for those that were decomposed, with the criterion that gives it."""
     effects = dict.fromkeys(s.read.responses.names)
     if s.screening is not None and s.screened is not None:
         effects |= analysis.screen(s.screening, s.screened, study.policy, study.method.bootstrap)
     out: dict[str, Any] = {}
     for j, name in enumerate(s.read.responses.names):
-        unit, criterion = RESPONSES[name]
+        unit = s.read.responses.units[j]
         failures, cautions = analysis.outcomes(s.read, name)
         block: dict[str, Any] = {
             "unit": unit,
-            "criterion": criterion,
+            "criterion": criterion_of[name],
             "nominal": float(s.nominal.responses.column(name)[0]),
             "status": Status(int(s.nominal.responses.codes(name)[0])).text,
             "morris": analysis.morris_json(study.space, effects[name]),

@@ -17,6 +17,7 @@ from levelone.campaign.pictures import frequency_groups, history_groups
 from levelone.campaign.sampling import Clock, Progress, Sampled, response_results, sample_study
 from levelone.campaign.sections import Sections, run_sections
 from levelone.campaign.store import prepare_folder, write_dataset, write_groups, write_json, write_sample
+from levelone.campaign.stored_builtin import StoredBuiltin, open_store
 from levelone.campaign.surrogate_errors import residual_dataset, surrogate_errors, with_errors
 from levelone.campaign.sweep import SweepCheck, sweep_check
 from levelone.config.study_file import Study
@@ -48,7 +49,7 @@ def run_study(
     threads: int | None = None,
     progress: Progress = lambda stage, done, total: None,
 ) -> Path:
-    """Run a study and write its results folder.
+    """Run a study and write its results folder; runs that the folder's store holds are not flown again.
 
     Parameters
     ----------
@@ -82,7 +83,8 @@ def run_study(
         progress("nominal flight", 1, 2)
         swept = sweep_check(model, study.sweep, study.windows)
         progress("nominal flight", 2, 2)
-    sampled = sample_study(study, model, nominal, seed, threads, progress, clock)
+    with open_store(folder, study, model) as store:
+        sampled = sample_study(study, StoredBuiltin(model, store), nominal, seed, threads, progress, clock)
     with clock.stage("errors"):
         errors = surrogate_errors(study, sampled, seed, threads, progress)
     with clock.stage("measures"):

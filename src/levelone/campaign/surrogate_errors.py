@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from levelone.campaign.sampling import Progress, Sampled
-from levelone.config.study_file import Study
+from levelone.campaign.sampling import Progress, Sampled, SampledStudy
 from levelone.dynamics.simulate import threads_of
 from levelone.uncertainty import (
     Kriging,
@@ -37,7 +36,7 @@ class SurrogateError:
 
 
 def surrogate_errors(
-    study: Study, sampled: Sampled, seed: int, threads: int | None, progress: Progress
+    study: SampledStudy, sampled: Sampled, seed: int, threads: int | None, progress: Progress
 ) -> dict[str, SurrogateError]:
     """Validate each surrogate of the study, and find intervals that hold its error, the responses side by side in threads."""
     names = sampled.read.responses.names

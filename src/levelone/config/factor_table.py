@@ -49,15 +49,21 @@ def inputs_of(tables: Sequence[tuple[str, FactorTable]], vehicle: Vehicle, airsp
         As for :func:`factor_of`; a target that two factors set, a name given twice, a distribution without ends.
     """
     factors, targets, nominal = zip(*(factor_of(table, vehicle, airspeed, path) for path, table in tables), strict=True)
-    for (path, _), factor in zip(tables, factors, strict=True):
-        first = next(each for each in factors if each.target == factor.target)
-        if first is not factor:
-            raise InputError(path, f"sets {factor.target} as the factor {first.name} does; each target may be set once")
+    check_targets([path for path, _ in tables], factors)
     space = FactorSpace(factors)
     space.require_bounded("a Morris design")
     values = np.array(nominal)
     values.setflags(write=False)
     return Inputs(space, targets, values)
+
+
+def check_targets(paths: Sequence[str], factors: Sequence[Factor]) -> None:
+    """InputError under its path for a factor whose target another one sets before it."""
+    first: dict[str | None, Factor] = {}
+    for path, factor in zip(paths, factors, strict=True):
+        other = first.setdefault(factor.target, factor)
+        if other is not factor:
+            raise InputError(path, f"sets {factor.target} as the factor {other.name} does; each target may be set once")
 
 
 def check_corners(inputs: Inputs, paths: Sequence[str], vehicle: Vehicle, manoeuvres: tuple[Manoeuvre, ...]) -> None:
@@ -119,11 +125,18 @@ def factor_of(table: FactorTable, vehicle: Vehicle, airspeed: float, path: str |
             f"{path}.value",
             f"is {value:.10g} {unit}, and the vehicle {vehicle.name!r} has {nominal:.10g} {unit}: change one of them",
         )
-    factor = Factor(table.name, _distribution(table, value, scale, path), target=target, unit=unit, source=in_words(table))
+    factor = Factor(table.name, distribution_of(table, value, scale, path), target=target, unit=unit, source=in_words(table))
     return factor, target, nominal
 
 
-def _distribution(table: FactorTable, value: float, scale: float, path: str) -> Distribution:
+def distribution_of(table: FactorTable, value: float, scale: float, path: str) -> Distribution:
+    """Distribution of an entry in the unit of its target, for which ``value`` is given and ``scale`` converts the other numbers.
+
+    Raises
+    ------
+    InputError
+        Unknown distribution, parameters that are missing, of another distribution or out of range.
+    """
     if table.distribution not in DISTRIBUTIONS:
         raise unknown_name(f"{path}.distribution", table.distribution, DISTRIBUTIONS)
     made = DISTRIBUTIONS[table.distribution]

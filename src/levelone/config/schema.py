@@ -97,8 +97,8 @@ def _path(location: Location, content: Any) -> str:
 def _keys_at(model: type[Strict], location: Location) -> list[str]:
     """Keys that the table at a location may hold."""
     for key in location:
-        if isinstance(key, str):
-            model = next(_tables_in(model.model_fields[key].annotation))
+        if isinstance(key, str) and key in model.model_fields:  # else it is the user's own name of a table in a table
+            model = next(_tables_in(model.model_fields[key].annotation), model)
     return [field.alias or name for name, field in model.model_fields.items()]
 
 

@@ -198,7 +198,7 @@ def _study(content: StudyFile, source: StudySource, vehicle: Vehicle, where: Pat
         targets=inputs.targets,
         nominal=inputs.nominal,
         correlations=described(content.correlation),
-        method=_method(content.method),
+        method=method_of(content.method),
         boundaries=boundaries,
         boundaries_source=boundaries_source,
         task=content.levels.task,
@@ -260,7 +260,8 @@ def _omega(given: FrequencyGrid, controller: Controller) -> FloatArray:
     return np.geomspace(given.omega_min, given.omega_max, given.points)
 
 
-def _method(given: MethodTable) -> Method:
+def method_of(given: MethodTable) -> Method:
+    """Sizes and options of the analysis; InputError unless the Sobol design has a power of two."""
     n = given.base_points
     if n & (n - 1):
         near = 1 << (n.bit_length() - 1)

@@ -17,7 +17,8 @@ from levelone.report import style, symbols
 _FIRST: dict[str, Any] = {"color": style.BLUE, "linewidth": 0.0}
 _TOTAL: dict[str, Any] = {"facecolor": "white", "edgecolor": style.BLUE, "linewidth": 0.7}
 _WHISKER: dict[str, Any] = {"fmt": "none", "elinewidth": 0.7, "capsize": 1.4, "capthick": 0.6}
-_MARGINS = style.Margins(left=0.36, top=0.46, between=0.45, beside=0.42)
+_LETTER = 0.062
+"""in: width of a letter of a factor that has no symbol."""
 _VISIBLE = 0.02
 """Part of the largest ST from which a bounding value is drawn: below it, marks would only hide the bar."""
 _BOUND: dict[str, Any] = {"linestyle": "none", "marker": "|", "markersize": 6.0, "markeredgewidth": 1.0, "color": style.VERMILLION}
@@ -30,7 +31,8 @@ def draw_indices(entries: Mapping[str, Any]) -> Figure:
     rows = -(-count // columns)
     factors = max(len(entry["sobol"]) for entry in entries.values())
     width = style.COLUMN if count == 1 else style.PAGE
-    figure, axes = style.sheet(width, 0.55 + rows * (0.25 + 0.155 * factors) + 0.25 * (rows - 1), rows, columns, margins=_MARGINS)
+    height = 0.55 + rows * (0.25 + 0.155 * factors) + 0.25 * (rows - 1)
+    figure, axes = style.sheet(width, height, rows, columns, margins=_margins(entries))
     bounded = False
     for panel, (name, entry) in zip(axes.flat, entries.items(), strict=False):
         bounded |= _bars(panel, name, entry)
@@ -43,6 +45,14 @@ def draw_indices(entries: Mapping[str, Any]) -> Figure:
         handles.append(Line2D([], [], **_BOUND, label="$S_T$ with undefined runs at the smallest / largest value"))
     style.key(figure, handles, columns=len(handles))
     return figure
+
+
+def _margins(entries: Mapping[str, Any]) -> style.Margins:
+    """Room for the names of the factors beside their bars."""
+    names = {factor for entry in entries.values() for factor in entry["sobol"]}
+    longest = max((len(name) for name in names if symbols.mathtext(name) == name), default=0)
+    room = min(_LETTER * longest, 1.2) + 0.06
+    return style.Margins(left=max(0.36, room), top=0.46, between=0.45, beside=max(0.42, room + 0.06))
 
 
 def _bars(panel: Axes, name: str, entry: Mapping[str, Any]) -> bool:

@@ -76,7 +76,7 @@ def sensitivity(results: Results, criterion: str) -> list[Picture]:
         for name, entry in entries.items()
     ]  # fmt: skip
     caption = (
-        "Sobol indices on the surrogate, with 95 % bootstrap intervals (black: first order, grey: total). "
+        "Sobol indices on the surrogate, with 95 % intervals (black: first order, grey: total). "
         "White is what a factor does together with others."
     )
     return [*plans, Picture(f"sobol_{criterion}", criterion, caption, len(entries) > 1, partial(draw_indices, entries))]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -74,7 +74,7 @@ def load_results(directory: str | PathLike[str]) -> Results:
         The folder holds no results, is incomplete, or was written under another schema.
     """
     folder = Path(directory)
-    summary = _summary(folder)
+    summary = read_summary(folder, _SECTIONS)
     groups = {name: read_group(folder / "histories.nc", name) for name in CRITERIA}
     return Results(
         directory=folder,
@@ -93,7 +93,14 @@ def attribute(data: xr.Dataset, name: str) -> float:
     return float(data.attrs[name])
 
 
-def _summary(folder: Path) -> dict[str, Any]:
+def read_summary(folder: Path, sections: Sequence[str]) -> dict[str, Any]:
+    """``results.json`` of a folder, which must have the sections.
+
+    Raises
+    ------
+    InputError
+        The folder holds no results, is incomplete, or was written under another schema.
+    """
     path = folder / "results.json"
     if not folder.is_dir():
         raise InputError(str(folder), "is not a folder; give the one that a finished study wrote (it holds results.json)")
@@ -108,7 +115,7 @@ def _summary(folder: Path) -> dict[str, Any]:
     schema = summary.get("schema") if isinstance(summary, dict) else None
     if schema != SCHEMA:
         raise InputError(f"{path}: schema", f"is {schema!r}; this version reads {SCHEMA}: run the study again or use its levelone")
-    for section in _SECTIONS:
+    for section in sections:
         if section not in summary:
             raise InputError(f"{path}: {section}", "missing; run the study again")
     return summary

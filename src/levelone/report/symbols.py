@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 
 from markupsafe import Markup, escape
 
@@ -26,6 +30,13 @@ _SPECIAL = {
     "omega_bw_gain_attitude": (r"\omega_{\mathrm{BW,gain}}", "<i>ω</i><sub>BW,gain</sub>"),
     "omega_bw_phase": (r"\omega_{\mathrm{BW,phase}}", "<i>ω</i><sub>BW,phase</sub>"),
     "tau_p_attitude": (r"\tau_p", "<i>τ</i><sub>p</sub>"),
+    "omega_180": (r"\omega_{180}", "<i>ω</i><sub>180</sub>"),
+    "coherence": (r"\gamma^2_{xy}", "<i>γ</i>²<sub>xy</sub>"),
+    **{
+        f"delta_{angle}_{at}": (rf"\Delta\{angle}_{{\mathrm{{{at}}}}}", f"Δ<i>{GREEK[angle]}</i><sub>{at}</sub>")
+        for angle in ("phi", "psi")
+        for at in ("min", "pk")
+    },
     "omega_bw_swept": (r"\omega_{\mathrm{BW}}", "<i>ω</i><sub>BW</sub>"),
     "tau_p_swept": (r"\tau_p", "<i>τ</i><sub>p</sub>"),
     "rise_time": (r"T_{\mathrm{eq}}", "<i>T</i><sub>eq</sub>"),
@@ -63,8 +74,39 @@ _READINGS = (("_attitude", r"-\theta/V_{\mathrm{lon}}"), ("", r"q/V_{\mathrm{lon
 _FIELD_UNITS = {"rad": (180.0 / math.pi, "deg"), "1": (1.0, "")}
 
 
+@dataclass(frozen=True)
+class Naming:
+    """How a response of a model of one's own is called: in words, by the symbol of its quantity, and by its test where several have
+    one.
+    """
+
+    title: str
+    quantity: str
+    test: str = ""
+
+
+_NAMINGS: ContextVar[Mapping[str, Naming] | None] = ContextVar("namings", default=None)
+
+
+@contextmanager
+def naming(responses: Mapping[str, Naming]) -> Iterator[None]:
+    """Call responses by these names, and not by those of the built-in vehicle's, while the block runs."""
+    token = _NAMINGS.set(responses)
+    try:
+        yield
+    finally:
+        _NAMINGS.reset(token)
+
+
+def _named(response: str) -> Naming | None:
+    return (_NAMINGS.get() or {}).get(response)
+
+
 def mathtext(name: str) -> str:
     """Symbol of a factor or response for matplotlib; a name without one comes back as plain text."""
+    own = _named(name)
+    if own is not None and own.quantity != name:
+        return mathtext(own.quantity) + (f" ({own.test})" if own.test else "")
     if name in _SPECIAL:
         return f"${_SPECIAL[name][0]}$"
     parts = _parts(name)
@@ -75,6 +117,9 @@ def mathtext(name: str) -> str:
 
 def html(name: str) -> Markup:
     """Symbol of a factor or response for the page; a name without one comes back escaped."""
+    own = _named(name)
+    if own is not None and own.quantity != name:
+        return html(own.quantity) + (Markup(" ({})").format(own.test) if own.test else "")
     if name in _SPECIAL:
         return Markup(_SPECIAL[name][1])  # constants of this module
     parts = _parts(name)
@@ -86,14 +131,15 @@ def html(name: str) -> Markup:
 
 def title(response: str) -> str:
     """A response in words; its name where it has none."""
-    return _TITLES.get(response, response)
+    own = _named(response)
+    return own.title if own is not None else _TITLES.get(response, response)
 
 
 def axis_label(response: str, unit: str) -> str:
     """Symbol and unit for an axis, with the reading where a symbol has two: ``ω_BW of q/V_lon, rad/s``."""
     shown = field_unit(unit)[1]
     text = mathtext(response)
-    if response.startswith(("omega_bw", "tau_p")):
+    if _NAMINGS.get() is None and response.startswith(("omega_bw", "tau_p")):
         text += " of $" + next(label for suffix, label in _READINGS if response.endswith(suffix)) + "$"
     return f"{text}, {shown}" if shown else text
 

@@ -57,14 +57,14 @@ class Assessment:
     levels
         [n] for each of ``CRITERIA``, codes of :class:`levelone.handling.levels.Level`.
     extrapolated
-        [n] Level of attitude quickness by the extended boundaries.
+        [n] Level of attitude quickness by the extended boundaries; None for a model that does not give it.
     extremes
         For each manoeuvre, [n] of each extreme that the simulation kept.
     """
 
     responses: Responses
     levels: Mapping[str, IntArray]
-    extrapolated: IntArray
+    extrapolated: IntArray | None
     extremes: Mapping[str, Mapping[str, FloatArray]]
 
 
@@ -235,6 +235,6 @@ def _joined(parts: list[Assessment]) -> Assessment:
             first.responses.units,
         ),
         {name: np.concatenate([p.levels[name] for p in parts]) for name in first.levels},
-        np.concatenate([p.extrapolated for p in parts]),
+        np.concatenate([p.extrapolated for p in parts if p.extrapolated is not None]),
         {m: {name: np.concatenate([p.extremes[m][name] for p in parts]) for name in kept} for m, kept in first.extremes.items()},
     )

@@ -27,6 +27,8 @@ IntArray = NDArray[np.int64]
 
 #: characters of a message that are kept, from its end
 TAIL = 2000
+#: of :class:`levelone.handling.levels.Level`: the metric has no value
+NO_LEVEL = -1
 STANDS = (int(Status.OK), *(int(code) for code in CAUTIONS))
 
 
@@ -96,7 +98,7 @@ def failed(status: Status, message: str, responses: int, levels: int, seconds: f
     return Evaluations(
         np.full((1, responses), np.nan),
         np.full((1, responses), int(status), dtype=np.int64),
-        np.zeros((1, levels), dtype=np.int64),
+        np.full((1, levels), NO_LEVEL, dtype=np.int64),
         np.array([seconds]),
         (message[-TAIL:],),
     )
