@@ -111,6 +111,68 @@ def test_mistakes_are_one_line(pulse, tmp_path, options, words):
     assert not (tmp_path / "out" / "assessment.json").exists()
 
 
+def shifted(pulse: Path, name: str, by: float) -> Path:
+    """The same record on a clock that began earlier."""
+    table = np.loadtxt(pulse, delimiter=",", skiprows=1)
+    table[:, 0] += by
+    path = pulse.with_name(name)
+    np.savetxt(path, table, delimiter=",", header="time,stick,rate,pitch", comments="")
+    return path
+
+
+def test_times_of_the_data_are_not_taken_for_those_of_the_reference(pulse, tmp_path):
+    other = shifted(pulse, "flight.csv", 100.0)
+    done = call(
+        pulse, "--columns", COLUMNS, "--reference", other, "--on", "1.0", "--off", "1.2", "--delay", "0.05", "--from", "0.2",
+        "--to", "11.5", "--out", tmp_path / "out",
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    found = result(tmp_path / "out")
+    assert (found["data"][0]["from"], found["data"][0]["to"]) == pytest.approx((0.2, 11.5))
+    assert found["reference"]["data"][0]["from"] == pytest.approx(100.0)
+    assert found["reference"]["data"][0]["input"]["on"] == pytest.approx(101.0)
+    rows = {row["name"]: row for row in found["comparison"]["metrics"]}
+    assert rows["zeta"]["difference"] == pytest.approx(0.0, abs=2e-3)
+    assert rows["zeta"]["confidence"] == "low"
+
+
+def test_times_of_one_input_for_several_records(pulse, tmp_path):
+    done = call(pulse, shifted(pulse, "b.csv", 3.0), "--columns", COLUMNS, "--on", "1.0", "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "--on: holds for one record, 2 are given" in " ".join(done.output.split())
+
+
+def test_a_clock_without_a_unit_is_named_everywhere(pulse, tmp_path):
+    done = call(pulse, "--columns", COLUMNS, "--out", tmp_path / "out")
+    assert "no unit stated, taken as SI and rad: time" in done.output
+    data = result(tmp_path / "out")["data"][0]
+    assert data["assumed_si"] == ["time"]
+    assert data["columns"]["time"] == {"column": "time", "unit": "", "factor": 1.0, "offset": 0.0}
+    page = (tmp_path / "out" / "assessment.html").read_text()
+    assert '<th scope="row">time</th><td class="code">time</td><td>SI taken</td>' in page
+
+
+def test_a_clock_in_microseconds_ends_in_one_line(pulse, tmp_path):
+    table = np.loadtxt(pulse, delimiter=",", skiprows=1)
+    table[:, 0] *= 1e6
+    path = tmp_path / "us.csv"
+    np.savetxt(path, table, delimiter=",", header="timestamp,stick,rate,pitch", comments="")
+    done = call(path, "--columns", COLUMNS, "--out", tmp_path / "out")
+    assert done.exit_code == 2
+    assert "state its unit: time=timestamp[us]" in " ".join(done.output.split())
+    assert call(path, "--columns", f"time=timestamp[us], {COLUMNS}", "--out", tmp_path / "out").exit_code == 0
+
+
+def test_tolerances_that_are_no_file_of_tolerances(pulse, tmp_path):
+    (tmp_path / "deep.toml").write_text("name = " + "[" * 5000 + "]" * 5000)
+    other = shifted(pulse, "flight.csv", 0.5)
+    done = call(
+        pulse, "--columns", COLUMNS, "--reference", other, "--tolerances", tmp_path / "deep.toml", "--out", tmp_path / "out"
+    )
+    assert done.exit_code == 2
+    assert "nested too deep" in " ".join(done.output.split())
+
+
 def test_one_record_given_twice(pulse, tmp_path):
     done = call(pulse, pulse, "--columns", COLUMNS, "--out", tmp_path / "out")
     assert done.exit_code == 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from threading import Thread
@@ -30,7 +31,7 @@ MappingOption = Annotated[Path | None, typer.Option(metavar="FILE", help="Channe
 AxisOption = Annotated[AxisName | None, typer.Option(help="Axis of the input.  [default: that of its channel]")]
 KindOption = Annotated[Kind | None, typer.Option(help="What the input is.  [default: found in the data]")]
 InputOption = Annotated[str | None, typer.Option("--input", metavar="CHANNEL", help="Channel of the input.")]
-FromOption = Annotated[float | None, typer.Option("--from", help="First second that is used, of each file's clock.")]
+FromOption = Annotated[float | None, typer.Option("--from", help="First second of the data that is used, of each file's clock.")]
 ToOption = Annotated[float | None, typer.Option("--to", help="Last second that is used.")]
 OnOption = Annotated[float | None, typer.Option("--on", help="Beginning of the input, s.  [default: found in the data]")]
 OffOption = Annotated[float | None, typer.Option("--off", help="End of a pulse, s.  [default: found in the data]")]
@@ -94,7 +95,9 @@ def assess(
     flown = None
     if reference is not None:
         others = _sources(reference_columns, reference_mapping, "--reference-columns", "--reference-mapping")
-        flown = _reference(reference, others if others is not None else sources, window, request)
+        # what is counted on the data's clock says nothing about that of the reference
+        theirs = replace(request, input_on=None, input_off=None, delay=None)
+        flown = _reference(reference, others if others is not None else sources, {"largest_gap": gap}, theirs)
     _say(found, loaded)
     _write(folder, found, loaded, flown, tolerances)
 
@@ -182,7 +185,7 @@ def _write(
         for check in flown[0].checks:
             say(f"look again at the reference: {check}")
         if comparison.responses:
-            say(f"mismatch cost J = {comparison.cost:.3g}: {comparison.verdict}")
+            say(f"mismatch cost J = {comparison.cost:.3g}: {comparison.verdict} (recalled limits, unverified)")
     try:
         record = write_record(folder, record_of(found, loaded, flown, comparison))
     except OSError as error:

@@ -37,6 +37,7 @@ class Status(IntEnum):
     NOT_SETTLED = 31
     OTHER_FINAL_SPEED = 32
     NO_STEADY_COMMAND = 33
+    STILL_DRIVEN = 34
     # the measurement on a frequency response
     NO_PHASE_CROSSING = 40
     NO_OMEGA_180 = 41
@@ -88,6 +89,7 @@ _TEXT = {
     Status.NOT_SETTLED: "the speed has not settled at the command when the record ends: lengthen the manoeuvre or damp the loop",
     Status.OTHER_FINAL_SPEED: "the speed comes to rest at another value than was commanded: a limit or an unmodelled load holds it",
     Status.NO_STEADY_COMMAND: "no constant change of speed is commanded at the end of the record: a step that stays is needed",
+    Status.STILL_DRIVEN: "the input still drives the response where its free oscillation would be read: let it end faster",
     Status.NO_PHASE_CROSSING: "the phase never crosses the 45 deg margin inside the record",
     Status.NO_OMEGA_180: "the phase never reaches -180 deg: phase delay and gain bandwidth are undefined",
     Status.RANGE_TOO_SHORT: "the response ends below 2 omega_180: phase delay cannot be read; extend the sweep",

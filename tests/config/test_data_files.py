@@ -121,6 +121,11 @@ def test_matlab_7_3_and_no_link_to_another_file_is_followed(tmp_path):
     with h5py.File(tmp_path / "run.mat", "w", userblock_size=512) as made:
         made["log/t"], made["log/theta"] = TIME[None, :], ANGLE[None, :]
         made["log/stolen"] = h5py.ExternalLink("other.h5", "secret")
+        made["stolen"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "secret")
+        layout = h5py.VirtualLayout(shape=STICK.shape, dtype="f8")
+        layout[:] = h5py.VirtualSource(str(tmp_path / "other.h5"), "secret", shape=STICK.shape)
+        made.create_virtual_dataset("log/virtual", layout)
+        made.create_dataset("log/raw", shape=STICK.shape, dtype="f8", external=[(str(tmp_path / "other.h5"), 0, 8 * STICK.size)])
         made.create_group("#refs#")
     file = read_data(tmp_path / "run.mat")
     assert set(file.columns) == {"log.t", "log.theta"}
@@ -184,7 +189,7 @@ def test_a_mapping_in_a_line(tmp_path):
     np.testing.assert_array_equal(table.channels["theta"], np.radians(-ANGLE))
     np.testing.assert_allclose(table.channels["delta_lon"], STICK, rtol=1e-15)
     np.testing.assert_allclose(table.channels["V_lon"], 0.3048 * ANGLE, rtol=1e-15)
-    assert table.units == {"theta": "deg", "delta_lon": "in", "V_lon": "ft/s"}
+    assert table.units == {"time": "", "theta": "deg", "delta_lon": "in", "V_lon": "ft/s"}
 
 
 def test_a_mapping_in_a_file(tmp_path):
@@ -237,7 +242,7 @@ def test_channels_by_their_names_and_units_that_are_taken_for_granted(tmp_path):
     file = written(tmp_path, f"t,theta[deg],q,mode\n{rows(TIME, ANGLE, STICK, STICK)}\n")
     assert set(by_name(file)) == {"theta", "q"}
     assert series(file, by_name(file)["q"])[2] == ""
-    assert tabulate(file, by_name(file)).units == {"theta": "deg", "q": ""}
+    assert tabulate(file, by_name(file)).units == {"time": "", "theta": "deg", "q": ""}
 
 
 def test_uneven_samples_are_brought_to_the_median_interval_along_straight_lines(tmp_path):
@@ -329,3 +334,84 @@ def test_damaged_files_end_in_one_line(tmp_path_factory, ending, data):
     except InputError:
         return
     assert all(column.values.dtype == np.float64 and column.values.ndim == 1 for column in columns.values())
+
+
+def test_a_heading_that_wraps_in_trim_has_no_jumps_whether_or_not_it_is_interpolated(tmp_path):
+    heading = 360.0 + 2.0 * np.sin(3.0 * TIME)
+    for time in (TIME, TIME + 0.004 * np.cos(40.0 * TIME)):
+        file = written(tmp_path, f"time,heading\n{rows(time, heading % 360.0)}\n")
+        turned = np.degrees(table_of(file, "psi=heading[deg]").channels["psi"])
+        assert np.abs(np.diff(turned)).max() < 1.0
+        assert np.ptp(turned) == pytest.approx(4.0, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("name", "scale", "words"),
+    [
+        ("timestamp", 1e6, r"its samples are 50000 apart.*time=timestamp\[us\]"),
+        ("Timestamp_sample", 1e6, r"time=Timestamp_sample\[us\]"),
+        ("t", 1e3, r"its samples are 50 apart.*time=t\[ms\]"),
+    ],
+)
+def test_a_clock_of_another_unit_is_never_taken_for_seconds(tmp_path, name, scale, words):
+    file = written(tmp_path, f"{name},a\n{rows(scale * TIME, STICK)}\n")
+    with pytest.raises(InputError, match=words):
+        table_of(file, f"time={name}, q=a")
+    table = table_of(file, f"time={name}[{'us' if scale == 1e6 else 'ms'}], q=a")
+    assert table.dt == pytest.approx(0.05)
+    assert table.units["time"] in ("us", "ms")
+    assert table.sources["time"].name.startswith(name)
+
+
+def test_a_clock_that_is_slow_may_say_so(tmp_path):
+    file = written(tmp_path, f"time,a\n{rows(40.0 * TIME, STICK)}\n")
+    assert table_of(file, "time=time[s], q=a").dt == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("written_as", "column", "factor"),
+    [
+        ("gyro", 0, 1.0),
+        ("gyro/2", 1, 1.0),
+        ("gyro/2*-1", 1, -1.0),
+        ("gyro/4", 0, 0.25),
+        ("gyro*2/4", 0, 0.5),
+        ("gyro/2[rad/s]", 1, 1.0),
+    ],
+)
+def test_a_name_that_looks_like_a_division_is_a_name(tmp_path, written_as, column, factor):
+    given = (ANGLE, STICK)
+    file = written(tmp_path, f"time,gyro,gyro/2\n{rows(TIME, *given)}\n")
+    table = table_of(file, f"q={written_as}")
+    np.testing.assert_array_equal(table.channels["q"], factor * given[column])
+    assert table.sources["q"].factor == factor
+
+
+def test_an_element_of_an_array_is_no_unit(tmp_path):
+    file = written(tmp_path, f"time,xyz[0],xyz[1],stick[1]\n{rows(TIME, ANGLE, STICK, STICK)}\n")
+    assert list(file.columns) == ["time", "xyz[0]", "xyz[1]", "stick"]
+    assert file.columns["stick"].unit == "1"
+    np.testing.assert_array_equal(table_of(file, "q=xyz[1]").channels["q"], STICK)
+
+
+@pytest.mark.parametrize(
+    ("second", "units"), [("s,deg,1", ["s", "deg", "1"]), ("s,deg,", ["s", "deg", ""]), ("[s],[deg],-", ["s", "deg", "1"])]
+)
+def test_a_row_of_units_may_hold_ones_and_nothing(tmp_path, second, units):
+    file = written(tmp_path, f"time,pitch,stick\n{second}\n{rows(TIME, ANGLE, STICK)}\n")
+    assert [column.unit for column in file.columns.values()] == units
+    assert file.columns["time"].values.size == TIME.size
+
+
+def test_a_first_row_of_ones_and_words_is_no_row_of_units(tmp_path):
+    file = written(tmp_path, "time,pitch,mode\n1,1,HOLD\n2,3,HOLD\n3,4,HOLD\n")
+    np.testing.assert_array_equal(file.columns["pitch"].values, [1.0, 3.0, 4.0])
+
+
+def test_parquet_with_a_clock_in_whole_nanoseconds(tmp_path):
+    arrow = pytest.importorskip("pyarrow", reason="pyarrow reads Parquet")
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow reads Parquet")
+    clock = 1_700_000_000_000_000_001 + np.round(TIME * 1e9).astype(np.int64)
+    parquet.write_table(arrow.table({"stamp": clock, "a": STICK}), tmp_path / "run.parquet")
+    table = table_of(read_data(tmp_path / "run.parquet"), "time=stamp[s]*1e-9, q=a")
+    np.testing.assert_allclose(table.time, TIME, atol=2e-6)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,9 +64,9 @@ def test_first_order_is_exact_between_and_at_samples(delay):
 
 
 @pytest.mark.theory
-def test_a_step_that_takes_its_time_adds_nothing_to_the_delay():
-    """The control goes to its new value over 0.4 s: superposition of small steps."""
-    parts = 40
+@pytest.mark.parametrize(("parts", "late"), [(40, 0), (40, 3), (300, 29)])
+def test_a_step_that_takes_its_time_adds_nothing_to_the_delay(parts, late):
+    """The control goes to its new value over 0.4 or 3 s (superposition of small steps), and counts as begun on its way."""
 
     def rates(time):
         return np.mean([climb(time, 10.0, 2.0, 0.1, on=1.0 + k * DT) for k in range(parts)], axis=0)
@@ -73,7 +74,7 @@ def test_a_step_that_takes_its_time_adds_nothing_to_the_delay():
     def stick(time):
         return 0.2 * np.mean([time >= 1.0 + k * DT - 1e-9 for k in range(parts)], axis=0)
 
-    found = height_response(flown(rates, stick=stick))
+    found = height_response(replace(flown(rates, stick=stick), input_on=1.0 + late * DT))
     np.testing.assert_allclose([found.time_constant[0], found.delay[0]], [2.0, 0.1], rtol=1e-4)
 
 

@@ -124,15 +124,6 @@ def test_costs_in_words(value, words):
     assert verdict(value) == words
 
 
-def test_an_aligned_gain_is_reported_and_has_no_cost():
-    simulation = second_order().scaled(2.0)
-    error = response_error(simulation, second_order(), align_gain=True)
-    assert error.gain_offset == pytest.approx(20.0 * math.log10(2.0))
-    np.testing.assert_allclose(error.gain, 0.0, atol=1e-9)
-    with pytest.raises(InputError, match="the cost J is that of the whole error"):
-        mismatch_cost(error)
-
-
 def test_mean_of_several():
     costs = [cost(second_order(delay=d), second_order()) for d in (0.05, 0.08)]
     assert mean_cost(costs) == pytest.approx(0.5 * costs[1].cost)

@@ -80,6 +80,36 @@ def test_every_difference_up_to_the_allowed_one_is_within(flight, part):
     assert row.verdict == "outside"
 
 
+@pytest.mark.parametrize(("axis", "verdict"), [("pitch", "outside"), ("roll", "within"), ("yaw", "within"), ("", "no tolerance")])
+def test_a_period_is_judged_by_the_test_of_its_axis(axis, verdict):
+    """2.0 against 2.3 s: beyond 10 %, within 0.5 s, which 2.d.3.a allows for roll and yaw."""
+    (row,) = compare_metrics({"damped_period": 2.0}, {"damped_period": 2.3}, axis=axis)
+    assert row.verdict == verdict
+
+
+def test_pitch_is_carried_over_from_the_long_term_test_and_says_so():
+    shipped = load_tolerances()
+    for name in ("zeta", "damped_period"):
+        assert shipped[f"pitch.{name}"].confidence == "low"
+        assert "long-term" in shipped[f"pitch.{name}"].note
+        assert shipped[f"yaw.{name}"].confidence == "high"
+
+
+@pytest.mark.parametrize("unit", ["ms", "ft/s", "degrees", "", "g"])
+def test_a_unit_that_is_not_understood_is_refused(tmp_path, unit):
+    path = tmp_path / "own.toml"
+    path.write_text(f'schema = 1\n[tolerance.tau_p]\nabsolute = 10.0\nunit = "{unit}"\nconfidence = "low"\n', encoding="utf-8")
+    with pytest.raises(InputError, match=rf"tolerance.tau_p.unit: unknown name '{unit}'.*allowed: 1, 1/s, deg"):
+        load_tolerances(path)
+
+
+def test_degrees_become_radians(tmp_path):
+    path = tmp_path / "own.toml"
+    path.write_text('schema = 1\n[tolerance.roll.phi]\nabsolute = 1.0\nunit = "deg"\nconfidence = "low"\n', encoding="utf-8")
+    assert load_tolerances(path)["roll.phi"].absolute == pytest.approx(math.radians(1.0))
+    assert load_tolerances(path)["roll.phi"].unit == "rad"
+
+
 def test_a_file_of_the_user(tmp_path):
     path = tmp_path / "own.toml"
     path.write_text('schema = 1\n[tolerance.tau_p]\nabsolute = 0.02\nunit = "s"\nconfidence = "low"\n', encoding="utf-8")
@@ -91,7 +121,10 @@ def test_a_file_of_the_user(tmp_path):
     ("text", "message"),
     [
         ("schema = 2", "schema: is 2, must be 1"),
-        ("schema = 1", "one table for each metric"),
+        ("schema = 1", "tolerance: missing: one table for each metric"),
+        ("schema = 1\ntolerance = 3", "is '3', must be a table"),
+        ("schema = 1\n[tolerance]\nx = 3", "tolerance.x: is '3', must be a table"),
+        ("schema = 1\n[tolerance]\nyaw = 3", "tolerance.yaw: is '3', must be a table"),
         ("schema = 1\ntolerances = 1", "did you mean 'tolerance'"),
         ('schema = 1\n[tolerance.x]\nunit = "s"\nconfidence = "low"', "neither an absolute nor a relative"),
         ('schema = 1\n[tolerance.x]\nabsolute = 1.0\nconfidence = "low"', "unit: missing"),

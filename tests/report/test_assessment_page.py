@@ -88,6 +88,17 @@ def test_a_page_of_sweeps_against_flight(tmp_path):
     assert "nearly indistinguishable" in text
     assert "the phase never reaches -180 deg" in text
     assert "real (flight)" in text
+    assert "40 of 40" in text
+    assert "Unverified: formula and limits of J (confidence low:" in text
+
+
+def test_a_page_of_sweeps_beyond_the_envelopes_says_so(tmp_path):
+    paths = [[written(tmp_path, name, "sweep", size=size)] for name, size in (("sim", 0.3), ("real", 0.2))]
+    page = rendered(tmp_path, *paths, omega_min=10.2, omega_max=12.0)
+    assert "mismatch" not in drawn(page)
+    text = text_of(page)
+    assert "no frequency from 0.5 to 10 rad/s that both excite" in text
+    assert "0 of 40" in text
 
 
 def test_the_same_assessment_gives_the_same_bytes(tmp_path):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,10 @@ from levelone.campaign.assessment_tests import (
     translation_reading,
 )
 from levelone.errors import InputError
-from levelone.handling.axes import RATE_AND_ATTITUDE
+from levelone.handling.axes import RATE_AND_ATTITUDE, without_jumps
 from levelone.handling.bandwidth import ResponseType
 from levelone.handling.history import TimeHistory
+from levelone.handling.identification import WINDOWS
 from levelone.handling.large_amplitude import Agility
 from levelone.handling.levels import Boundaries, load_boundaries
 from levelone.handling.records import record
@@ -48,7 +49,7 @@ Reader = Callable[[TimeHistory, str, Boundaries], Reading]
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """One run as it was read: name, uniform times (s) and channels ``[sample]`` in SI and rad."""
+    """One run as it was read: name, uniform times (s) and channels ``[sample]`` in SI and rad; headings may wrap."""
 
     name: str
     time: FloatArray
@@ -64,10 +65,10 @@ class Request:
     axis, kind, input_name
         Axis of the input, what it is, and its channel.
     input_on, input_off
-        s: beginning and end of the input, where they are known better than the record shows.
+        s: beginning and end of the input, where they are known better than the one record shows.
     delay
         s between command and response, after which a pulse's response counts as free; None: until the rate has moved
-        (:func:`~levelone.campaign.assessment_input.until_moved`), which is never earlier.
+        (:func:`~levelone.campaign.assessment_input.until_moved`), an upper bound of it where the input is sharp.
     omega_min, omega_max
         rad/s: range of a sweep.
     windows
@@ -150,6 +151,7 @@ def assess(records: Sequence[Recorded], request: Request = Request()) -> Assessm
     """
     if not records:
         raise InputError("DATA", "no record given")
+    records = [_without_jumps(each) for each in records]
     shared = [name for name in records[0].channels if all(name in each.channels for each in records)]
     input_name = choose_input(shared, request.input_name, request.axis)
     axis = choose_axis(input_name, request.axis)
@@ -161,30 +163,36 @@ def assess(records: Sequence[Recorded], request: Request = Request()) -> Assessm
         listed = ", ".join(f"{each.name} {shape.kind}" for each, shape in zip(records, inputs, strict=True))
         raise InputError("DATA", f"records of one kind are assessed together, not {listed}; give --kind, or call once for each")
     kind = inputs[0].kind
+    if kind != "sweep" and len(records) > 1 and not (request.input_on is None and request.input_off is None):
+        raise InputError("--on" if request.input_on is not None else "--off", f"holds for one record, {len(records)} are given")
     histories = [_history(each, shape, shared, input_name, axis, request) for each, shape in zip(records, inputs, strict=True)]
     boundaries = load_boundaries(request.boundaries or SHIPPED[axis])
     sweeping = _sweeping(histories, request) if kind == "sweep" else None
     if sweeping is not None:
         responses, readings, unread = _swept(histories, axis, sweeping, boundaries)
     else:
-        responses, (readings, unread) = {}, _stepped(histories, kind, axis, request, boundaries)
+        responses, (readings, unread) = {}, _stepped(histories, inputs, axis, request, boundaries)
     if not readings and not responses:
         raise InputError("DATA", f"nothing can be read: {'; '.join(f'{each.criterion}: {each.why}' for each in unread)}")
-    checks = checks_of(histories, axis, kind, responses)
+    checks = checks_of(histories, inputs, axis, responses)
     return Assessment(
         kind, axis, input_name, tuple(histories), tuple(inputs), sweeping, responses, tuple(readings), tuple(unread), tuple(checks),
         boundaries,
     )  # fmt: skip
 
 
+def _without_jumps(each: Recorded) -> Recorded:
+    return replace(each, channels={name: without_jumps(name, values) for name, values in each.channels.items()})
+
+
 def _history(each: Recorded, shape: Input, shared: Sequence[str], input_name: str, axis: str, request: Request) -> TimeHistory:
     """One run; sweeps count from the mean before the input, or of all of the record where nothing came before it."""
     on = shape.on if request.input_on is None else request.input_on
     off = shape.off if request.input_off is None else request.input_off
-    before = each.time < on - 1e-9
+    before = each.time < min(on, shape.moves) - 1e-9
     known = before if before.sum() >= 2 else np.ones(each.time.size, dtype=bool)
     if shape.kind != "sweep" and not before.any():
-        raise InputError("--on", f"{each.name}: no sample before {on:g} s to take the trim from")
+        raise InputError("--on", f"{each.name}: no sample before {min(on, shape.moves):g} s to take the trim from")
     trim = {name: float(each.channels[name][known].mean()) for name in shared}
     delay = request.delay
     if delay is None:
@@ -209,7 +217,9 @@ def _sweeping(histories: Sequence[TimeHistory], request: Request) -> Sweeping:
     if low is None or high is None:
         found = excited_range(histories)
         low, high = found[0] if low is None else low, found[1] if high is None else high
-    return Sweeping(low, high, request.windows, request.response_type, request.phase_reference, request.task)
+    shortest = min(float(each.time[-1] - each.time[0]) for each in histories)
+    windows = request.windows or tuple(part * shortest for part in WINDOWS)
+    return Sweeping(low, high, windows, request.response_type, request.phase_reference, request.task)
 
 
 def _swept(
@@ -234,11 +244,14 @@ def _swept(
 
 
 def _stepped(
-    histories: Sequence[TimeHistory], kind: Kind, axis: str, request: Request, boundaries: Boundaries
+    histories: Sequence[TimeHistory], inputs: Sequence[Input], axis: str, request: Request, boundaries: Boundaries
 ) -> tuple[list[Reading], list[Unread]]:
     """Criteria on time histories, record by record, in the order of criteria."""
-    channels, source = histories[0].channels, histories[0].input_name
+    channels, source, kind = histories[0].channels, histories[0].input_name, inputs[0].kind
     speed = source.removesuffix("_ref")
+
+    def stability(history: TimeHistory, axis: str, boundaries: Boundaries) -> Reading:
+        return stability_reading(history, axis, boundaries, inputs[list(histories).index(history)].returns_in)
 
     def amplitude(history: TimeHistory, axis: str, boundaries: Boundaries) -> Reading:
         return amplitude_reading(history, axis, request.response_type, request.agility)
@@ -248,7 +261,7 @@ def _stepped(
     if angular:
         asked = [
             ("attitude_quickness", quickness_reading, ("step", "pulse"), angular),
-            ("dynamic_stability", stability_reading, ("pulse",), angular),
+            ("dynamic_stability", stability, ("pulse",), angular),
             ("large_amplitude", amplitude, ("step", "pulse"), angular),
         ]
     if axis in ("pitch", "roll"):

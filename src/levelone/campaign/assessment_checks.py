@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from levelone.campaign.assessment_input import AXIS_OF, Input
 from levelone.campaign.assessment_sweep import Response
 from levelone.handling.axes import RATE_AND_ATTITUDE
 from levelone.handling.bandwidth import COHERENCE_MIN
@@ -25,17 +26,23 @@ FEW_SAMPLES = 20.0
 """Samples a period of the highest frequency that is read, below which the sampling counts as coarse."""
 
 
-def checks_of(histories: Sequence[TimeHistory], axis: str, kind: str, responses: Mapping[str, Response]) -> list[str]:
+def checks_of(histories: Sequence[TimeHistory], inputs: Sequence[Input], axis: str, responses: Mapping[str, Response]) -> list[str]:
     """Everything that looks wrong, one sentence each."""
     found: list[str] = []
     for rate, angle in INTEGRALS:
         if all(rate in history.channels and angle in history.channels for history in histories):
             found += _agreement(histories, rate, angle)
-    for history in histories:
-        if kind == "sweep" and not (history.time < history.input_on - 1e-9).any():
+    for history, shape in zip(histories, inputs, strict=True):
+        if shape.kind != "sweep":
+            found += _direction(history, axis)
+            if shape.turns:
+                found.append(f"{history.name}: the input changes sides {shape.turns} times: criteria on a {shape.kind} do not hold")
+        elif not (history.time < history.input_on - 1e-9).any():
             found.append(f"{history.name}: the sweep begins with the record; changes are counted from its mean, not from trim")
+    rate = RATE_AND_ATTITUDE.get(axis, ("V_vert",))[0]
     for key, response in responses.items():
-        found += _signs(response, key, axis, histories[0])
+        if rate not in responses or key == rate:  # an angle that disagrees with its rate is seen above
+            found += _signs(response, key, axis, histories[0])
         found += _sampling(response, histories[0])
     return found
 
@@ -62,13 +69,33 @@ def _agreement(histories: Sequence[TimeHistory], rate: str, angle: str) -> list[
     return [f"{angle} moves {factor:.3g} times as far as the integral of {rate} says: is a unit or a sign wrong?"]
 
 
+def _follows(history: TimeHistory, axis: str) -> bool:
+    """Whether the input is one that its axis follows: forward speed pitches the nose down, and an input of another axis couples."""
+    return AXIS_OF.get(history.input_name) == axis and history.input_name != "V_lon_ref"
+
+
+def _direction(history: TimeHistory, axis: str) -> list[str]:
+    """After a step or pulse the rate goes first to the side of the input: read where it has half of its largest change."""
+    rate = RATE_AND_ATTITUDE.get(axis, ("V_vert",))[0]
+    if rate not in history.channels or not _follows(history, axis):
+        return []
+    after = history.time >= history.input_on - 1e-9
+    moved, given = (history.change(name)[0][after] for name in (rate, history.input_name))
+    first = moved[np.argmax(np.abs(moved) >= 0.5 * np.abs(moved).max())]
+    if first * given[np.argmax(np.abs(given))] >= 0.0:
+        return []
+    return [f"{history.name}: {rate} first goes against {history.input_name}: is one of the signs wrong?"]
+
+
 def _signs(response: Response, key: str, axis: str, history: TimeHistory) -> list[str]:
-    """An aircraft's rate begins in the direction of the command: a response of rate that does not has a wrong sign somewhere."""
-    if axis == "heave" or key != RATE_AND_ATTITUDE[axis][0] or history.input_name == "V_lon_ref":
+    """An aircraft's rate begins in the direction of the command: a response that does not has a wrong sign somewhere. Of an angle
+    it is that of its rate, i omega times as large, which an angle in phase (attitude command) or a quarter turn behind has."""
+    if not _follows(history, axis):
         return []
     inner = response.response
     good = np.isfinite(inner.value) & (np.nan_to_num(inner.coherence) >= COHERENCE_MIN)
-    if not good.any() or inner.value[good].real.sum() > 0.0:
+    rate = inner.value * (1j * inner.omega if (axis in RATE_AND_ATTITUDE and key == RATE_AND_ATTITUDE[axis][1]) else 1.0)
+    if not good.any() or rate[good].real.sum() > 0.0:
         return []
     return [f"{key} answers against {history.input_name}: is one of the signs wrong? Bandwidths need a response that goes with it"]
 

@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from levelone.campaign.assessment import Assessment
 from levelone.campaign.assessment_tests import Reading
 from levelone.errors import InputError
-from levelone.handling.added_dynamics import AddedDynamics, added_dynamics
+from levelone.handling.added_dynamics import OMEGA, AddedDynamics, added_dynamics
 from levelone.handling.mismatch import Mismatch, mean_cost, mismatch_cost, response_error, verdict
-from levelone.handling.tolerances import MetricRow, Tolerance, compare_metrics
+from levelone.handling.tolerances import MetricRow, Tolerance, compare_metrics, load_tolerances, tolerance_of
 
 
 @dataclass(frozen=True, eq=False)
 class ResponseMatch:
-    """One pair of frequency responses: cost of the mismatch, and the errors between the envelopes."""
+    """One pair of frequency responses: cost of the mismatch, and the errors between the envelopes (None where these say nothing:
+    ``noticed`` says why)."""
 
     key: str
     title: str
     mismatch: Mismatch
-    added: AddedDynamics
+    added: AddedDynamics | None
+    noticed: str
+
+    @property
+    def share(self) -> float:
+        """Fraction of the frequencies that could be read at which the error lies inside the envelopes; NaN without any."""
+        return math.nan if self.added is None else self.added.share
+
+    @property
+    def read(self) -> int:
+        """Frequencies, of :data:`~levelone.handling.added_dynamics.POINTS`, that the share rests on."""
+        return 0 if self.added is None else self.added.error.used
 
 
 @dataclass(frozen=True)
@@ -61,7 +74,8 @@ def compare(simulation: Assessment, flight: Assessment, tolerances: Mapping[str,
     Raises
     ------
     InputError
-        Another manoeuvre, axis or input, or another number of steps or pulses.
+        Another manoeuvre, axis or input, another number of steps or pulses, no frequency in common, or a tolerance in a unit that
+        is not its metric's.
 
     Notes
     -----
@@ -89,7 +103,12 @@ def compare(simulation: Assessment, flight: Assessment, tolerances: Mapping[str,
 def _match(simulation: Assessment, flight: Assessment, key: str) -> ResponseMatch:
     one, other = simulation.responses[key], flight.responses[key]
     mismatch = mismatch_cost(response_error(one.response, other.response))
-    return ResponseMatch(key, one.title, mismatch, added_dynamics(one.response, other.response))
+    try:
+        added = added_dynamics(one.response, other.response)
+    except InputError:
+        low, high = OMEGA
+        return ResponseMatch(key, one.title, mismatch, None, f"no frequency from {low:g} to {high:g} rad/s that both excite")
+    return ResponseMatch(key, one.title, mismatch, added, added.verdict)
 
 
 def _paired(
@@ -110,7 +129,12 @@ def _paired(
 
 
 def _pair(simulation: Reading, flight: Reading, tolerances: Mapping[str, Tolerance] | None) -> Pair:
-    """Values of both; what a requirement asks for is no metric."""
+    """Values of both; what a requirement asks for is no metric. InputError for a tolerance that is stated in another unit."""
+    known = load_tolerances() if tolerances is None else tolerances
+    for each in flight.values:
+        tolerance = tolerance_of(known, each.name, flight.axis)
+        if tolerance is not None and tolerance.unit != each.unit:
+            raise InputError(f"tolerance.{tolerance.name}.unit", f"is {tolerance.unit!r}, but {each.name} is in {each.unit!r}")
     sides = ([each for each in reading.values if not each.name.endswith("_required")] for reading in (flight, simulation))
     values = ({each.name: each.value for each in side} for side in sides)
-    return Pair(simulation, flight, compare_metrics(*values, tolerances))
+    return Pair(simulation, flight, compare_metrics(*values, known, axis=flight.axis))

@@ -19,16 +19,15 @@ SAME_INTERVAL = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
-    """A file as it was used: the file, its mapping, its channels, and the record that they are."""
+    """A file as it was used: the file, its channels with where they come from, and the record that they are."""
 
     file: DataFile
-    mapping: Mapping[str, Source]
     table: Table
     record: Recorded
 
     @property
     def assumed_units(self) -> list[str]:
-        """Channels whose unit neither the file nor the mapping states, so that SI was taken."""
+        """Channels (and ``time``) whose unit neither the file nor the mapping states, so that SI was taken."""
         return [name for name, unit in self.table.units.items() if not unit and CHANNELS[name] != "1"]
 
 
@@ -73,8 +72,8 @@ def load_records(
         tables = [tabulate(file, sources, dt=longest, **options) for file, sources in zip(files, mappings, strict=True)]
     names = _names(files)
     return [
-        Loaded(file, sources, table, Recorded(name, table.time, table.channels))
-        for file, sources, table, name in zip(files, mappings, tables, names, strict=True)
+        Loaded(file, table, Recorded(name, table.time, table.channels))
+        for file, table, name in zip(files, tables, names, strict=True)
     ]
 
 

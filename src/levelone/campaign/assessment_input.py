@@ -26,13 +26,17 @@ AXIS_OF: dict[str, AxisName] = {
 """Axis that an input is made for."""
 
 THRESHOLD = 0.1
-"""Departure from its value before the input, as a fraction of the largest one, at which an input counts as begun or ended."""
-NOISE = 4.0
-"""Times its own standard deviation before the input that a departure must exceed at the least."""
+"""Departure from its value before the input, as a fraction of the largest one, at which an input counts as begun."""
+STILL, BACK = 0.005, 0.02
+"""The same fraction within which it has not moved at all yet, and within which it is back: what is left drives the response."""
+HELD = 0.9
+"""The same fraction that an input has as long as it has not begun to come back."""
+NOISE, LONE = 4.0, 5.0
+"""Times its own standard deviation before the input that a departure must exceed at the least, and that the last one must."""
 UNSTEADY = 0.02
 """Standard deviation before a step or pulse, as a fraction of its size, above which there is no trim."""
 REVERSALS = 4
-"""Changes of side after which an input is a sweep and no longer a step, pulse or doublet."""
+"""Changes of side from which on an input is a sweep; a step and a pulse have none."""
 STAYS, RETURNS = 0.5, 0.2
 """Fraction of its largest departure that a step still has at the end of the record, and that a pulse is down to."""
 EXCITED_DB = 30.0
@@ -52,19 +56,27 @@ class Input:
     ----------
     kind
         ``"sweep"``, ``"step"`` or ``"pulse"``.
-    on, off
-        s: first sample off the value before, and first one back there for good; ``off`` is NaN for a step.
+    moves, on, off
+        s: first sample that moves at all, first one off the value before by :data:`THRESHOLD`, and first one back for good,
+        within :data:`BACK`; ``off`` is NaN for a step.
     before
         Value before the input; the mean of the whole record where nothing came before it.
     size
         Largest departure from it, with its sign.
+    returns_in
+        s from the last sample at :data:`HELD` of it to ``off``; NaN for a step.
+    turns
+        How often it changes sides; never for a step or pulse.
     """
 
     kind: Kind
+    moves: float
     on: float
     off: float
     before: float
     size: float
+    returns_in: float
+    turns: int
 
 
 def recognise(time: FloatArray, values: FloatArray, *, kind: Kind | None = None, name: str = "input") -> Input:
@@ -82,7 +94,8 @@ def recognise(time: FloatArray, values: FloatArray, *, kind: Kind | None = None,
     Raises
     ------
     InputError
-        An input that does not move, that moves from the first sample on (step, pulse), or that is neither of the three.
+        An input that does not move, that moves from the first sample on (step, pulse), or that is neither of the three; one that
+        changes sides without being a sweep (a doublet), unless the user says what it is.
     """
     first = _begins(values)
     if first is None:
@@ -90,22 +103,48 @@ def recognise(time: FloatArray, values: FloatArray, *, kind: Kind | None = None,
             name,
             f"does not move beyond its noise at the start of the record (range {np.ptp(values):.3g}): see --input and --from",
         )
-    before = float(values[:first].mean()) if first >= 2 else float(values.mean())
+    still = _still(values, first)
+    before = float(values[:still].mean()) if first >= 2 else float(values.mean())
     change = values - before
     size = float(change[np.argmax(np.abs(change))])
-    away = np.abs(change) > THRESHOLD * abs(size)
-    found = kind or _kind(change, size, away, name)
+    turns = int(np.count_nonzero(np.diff(np.sign(change[np.abs(change) > THRESHOLD * abs(size)]))))
+    found = kind or _kind(change, size, turns, name)
     if found != "sweep" and first < 2:
         raise InputError(
             name, f"moves from the first sample at {time[0]:.4g} s on: no trim before it; begin the record earlier, or set --from"
         )
-    if found != "sweep" and float(values[:first].std()) > UNSTEADY * abs(size):
+    noise = float(values[:still].std())
+    if found != "sweep" and noise > UNSTEADY * abs(size):
         raise InputError(name, f"is not steady before {time[first]:.4g} s: begin the record with trim, or set --from")
-    last = int(np.flatnonzero(away)[-1])
-    ends = last + 1 < values.size and found != "step"
-    if found == "pulse" and not ends:
+    last = _last(change, size, noise) if found != "step" else None
+    if found == "pulse" and last is None:
         raise InputError(name, f"has not come back at the end of the record, {time[-1]:.4g} s: this is no pulse")
-    return Input(found, float(time[first]), float(time[last + 1]) if ends else math.nan, before, size)
+    off = math.nan if last is None else float(time[last + 1])
+    held = float(time[np.flatnonzero(np.abs(change) >= HELD * abs(size))[-1]])
+    return Input(found, float(time[still]), float(time[first]), off, before, size, off - held, turns)
+
+
+def _still(values: FloatArray, first: int) -> int:
+    """Number of samples before the input moves at all: a control that is moved slowly is on its way before it counts as begun."""
+    if first < 2:
+        return first
+    quiet = values[: max(first // 2, 2)]
+    size = float(np.abs(values - np.median(quiet)).max())
+    moved = np.abs(values[:first] - np.median(quiet)) > max(STILL * size, NOISE * float(quiet.std()))
+    still = np.flatnonzero(~moved)
+    return max(int(still[-1]) + 1, 2) if still.size else first
+
+
+def _last(change: FloatArray, size: float, noise: float) -> int | None:
+    """Last sample before the input is back for good; None where it does not come back.
+
+    A control comes to rest near its value before, hardly ever on it: it counts as back where it keeps to where it ends.
+    """
+    end = float(change[-max(change.size // 10, 5) :].mean())
+    if abs(end) > THRESHOLD * abs(size):
+        return None
+    away = np.flatnonzero(np.abs(change - end) > max(BACK * abs(size), LONE * noise))
+    return int(away[-1]) if away.size and away[-1] + 1 < change.size else None
 
 
 def _begins(values: FloatArray) -> int | None:
@@ -125,10 +164,15 @@ def _begins(values: FloatArray) -> int | None:
     return first
 
 
-def _kind(change: FloatArray, size: float, away: NDArray[np.bool_], name: str) -> Kind:
-    sides = np.sign(change[away])
-    if np.count_nonzero(np.diff(sides)) >= REVERSALS:
+def _kind(change: FloatArray, size: float, turns: int, name: str) -> Kind:
+    if turns >= REVERSALS:
         return "sweep"
+    if turns:
+        raise InputError(
+            name,
+            f"changes sides {turns} times: neither step, pulse nor sweep (a doublet or a 3-2-1-1 is none of them); "
+            "--kind says what it shall be read as",
+        )
     end = abs(float(change[-max(change.size // 10, 5) :].mean()) / size)
     if end >= STAYS:
         return "step"
@@ -142,8 +186,8 @@ def _kind(change: FloatArray, size: float, away: NDArray[np.bool_], name: str) -
 def until_moved(time: FloatArray, rate: FloatArray, on: float) -> float:
     """Time from the input to where the rate has moved by :data:`THRESHOLD` of its largest change, s.
 
-    No response begins before every delay has passed: this is an upper bound of the delay, and a free response that is counted
-    from the end of the input plus this time is free, whatever the delay is.
+    No response begins before every delay has passed: after a sharp input this is an upper bound of the delay. It is none for a
+    control that moves slowly, which is on its way before ``on``.
 
     Parameters
     ----------

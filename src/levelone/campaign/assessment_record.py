@@ -16,6 +16,7 @@ from levelone.campaign.assessment import Assessment
 from levelone.campaign.assessment_compare import Comparison
 from levelone.campaign.assessment_data import Loaded
 from levelone.campaign.assessment_tests import NO_CHART, Reading
+from levelone.handling import added_dynamics, mismatch
 from levelone.handling.levels import Level
 from levelone.status import Status
 
@@ -64,7 +65,7 @@ def _side(assessment: Assessment, loaded: Sequence[Loaded]) -> dict[str, Any]:
         "kind": assessment.kind, "axis": assessment.axis, "input": assessment.input_name,
         "data": [_data(each, shape) for each, shape in zip(loaded, assessment.inputs, strict=True)],
         "sweep": {} if how is None else {
-            "omega_min": how.omega_min, "omega_max": how.omega_max, "windows": list(how.windows or ()),
+            "omega_min": how.omega_min, "omega_max": how.omega_max, "windows": list(how.windows),
             "response_type": how.response_type, "phase_reference": how.phase_reference, "task": how.task,
         },
         "boundaries": {"name": assessment.boundaries.name, "source": assessment.boundaries.source},
@@ -83,9 +84,12 @@ def _data(each: Loaded, shape: Any) -> dict[str, Any]:
         "resampled": table.resampled, "notes": list(table.notes), "assumed_si": each.assumed_units,
         "columns": {
             name: {"column": source.name, "unit": table.units.get(name, ""), "factor": source.factor, "offset": source.offset}
-            for name, source in each.mapping.items()
+            for name, source in table.sources.items()
         },
-        "input": {"kind": shape.kind, "on": shape.on, "off": shape.off, "before": shape.before, "size": shape.size},
+        "input": {
+            "kind": shape.kind, "moves": shape.moves, "on": shape.on, "off": shape.off, "returns_in": shape.returns_in,
+            "before": shape.before, "size": shape.size, "changes_of_side": shape.turns,
+        },
     }  # fmt: skip
 
 
@@ -93,7 +97,10 @@ def _reading(each: Reading) -> dict[str, Any]:
     return {
         "criterion": each.criterion, "title": each.title, "axis": each.axis, "record": each.record,
         "values": {
-            one.name: {"value": one.value, "unit": one.unit, "std": one.error, "status": one.text} for one in each.values
+            one.name: {
+                "value": one.value, "unit": one.unit, "std": one.error, "half_width_95": one.half_width, "status": one.text,
+            }
+            for one in each.values
         },
         "level": int(each.level), "level_text": level_text(each), "level_extrapolated": int(each.level_extrapolated),
         "chart": each.chart, "verified": each.verified, "times": dict(each.times), "remarks": list(each.remarks),
@@ -113,11 +120,15 @@ def _response(each: Any) -> dict[str, Any]:
 def _comparison(found: Comparison) -> dict[str, Any]:
     return {
         "mean_cost": found.cost, "verdict": found.verdict,
+        "formula": {
+            "cost": {"confidence": mismatch.CONFIDENCE, "source": mismatch.SOURCE},
+            "envelopes": {"confidence": added_dynamics.CONFIDENCE, "source": added_dynamics.SOURCE},
+        },
         "responses": [
             {
                 "key": each.key, "title": each.title, "cost": each.mismatch.cost, "gain_part": each.mismatch.gain_part,
                 "phase_part": each.mismatch.phase_part, "verdict": each.mismatch.verdict, "frequencies": each.mismatch.used,
-                "unnoticeable_share": each.added.share, "unnoticeable": each.added.verdict,
+                "unnoticeable_share": each.share, "unnoticeable": each.noticed, "unnoticeable_frequencies": each.read,
             }
             for each in found.responses
         ],
@@ -127,6 +138,7 @@ def _comparison(found: Comparison) -> dict[str, Any]:
                 "flight_record": pair.flight.record, "name": row.name, "simulation": row.simulation, "flight": row.flight,
                 "difference": row.difference, "allowed": row.allowed, "verdict": row.verdict,
                 "paragraph": "" if row.tolerance is None else row.tolerance.paragraph,
+                "confidence": "" if row.tolerance is None else row.tolerance.confidence,
             }
             for pair in found.pairs
             for row in pair.rows

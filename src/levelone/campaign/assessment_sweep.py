@@ -36,14 +36,14 @@ class Sweeping:
     omega_min, omega_max
         rad/s.
     windows
-        s; None for those of :func:`~levelone.handling.joint_identification.identify_records`.
+        s: lengths of the windows.
     response_type, phase_reference, task
         As for :func:`~levelone.handling.bandwidth.bandwidth`.
     """
 
     omega_min: float
     omega_max: float
-    windows: tuple[float, ...] | None = None
+    windows: tuple[float, ...]
     response_type: ResponseType = "rate_command"
     phase_reference: float = 0.0
     task: str = "all_other"
@@ -99,6 +99,7 @@ def bandwidth_reading(response: Response, axis: str, how: Sweeping, boundaries: 
     """Bandwidth and phase delay of one response; ``judged`` where it is one of attitude, which the standard reads."""
     found = bandwidth(response.response, how.response_type, phase_reference=how.phase_reference)
     errors = bandwidth_errors(response.identified, found, how.phase_reference)
+    averages = _averages(response.identified, found)
     names = (
         ("omega_bw", "rad/s", "status"),
         ("tau_p", "s", "status_tau_p"),
@@ -107,7 +108,8 @@ def bandwidth_reading(response: Response, axis: str, how: Sweeping, boundaries: 
         ("omega_180", "rad/s", "status_180"),
     )
     values = tuple(
-        Value(name, float(getattr(found, name)), unit, int(getattr(found, status)), errors[name]) for name, unit, status in names
+        Value(name, float(getattr(found, name)), unit, int(getattr(found, status)), errors[name], averages[name])
+        for name, unit, status in names
     )
     chart = boundaries.bandwidth.get(how.task) if judged else None
     if chart is None:
@@ -119,6 +121,16 @@ def bandwidth_reading(response: Response, axis: str, how: Sweeping, boundaries: 
         "bandwidth", response.title, axis, "all records", values, level, beyond,
         NO_CHART if chart is None else chart.name, chart is None or chart.verified, {}, remarks,
     )  # fmt: skip
+
+
+def _averages(identified: Identified, found: Bandwidth) -> dict[str, float]:
+    """Independent averages that each value's error rests on: the fewest of the frequencies that it is read at."""
+    turn, fall = float(found.omega_180), float(found.omega_bw_gain)
+    read = {
+        "omega_bw": (float(found.omega_bw),), "tau_p": (turn, 2.0 * turn), "omega_bw_phase": (float(found.omega_bw_phase),),
+        "omega_bw_gain": (fall, turn), "omega_180": (turn,),
+    }  # fmt: skip
+    return {name: float(np.interp(at, identified.response.omega, identified.averages).min()) for name, at in read.items()}
 
 
 def bandwidth_errors(identified: Identified, found: Bandwidth, phase_reference: float = 0.0) -> dict[str, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from levelone.handling.coupling import coupling
 from levelone.handling.damping import dynamic_stability
 from levelone.handling.height_response import height_response
 from levelone.handling.history import TimeHistory
+from levelone.handling.joint_identification import student_factor
 from levelone.handling.large_amplitude import Agility, large_amplitude
 from levelone.handling.levels import Boundaries, Level, load_boundaries
 from levelone.handling.picks import Picks
@@ -25,22 +26,33 @@ from levelone.status import Status
 
 FloatArray = NDArray[np.float64]
 NO_CHART = "no chart"
+SHARP = 0.25
+"""Part of the damped period within which a pulse's control must come back, for what follows to be a free response. Assumed: no
+source states it; what a control that decays leaves behind is then lost in the response."""
 
 
 @dataclass(frozen=True)
 class Value:
-    """One number of a criterion: SI and rad, its standard deviation from noise (NaN where not known), and its status."""
+    """One number of a criterion: SI and rad, its status, and its standard deviation from noise with the number of independent
+    averages that this rests on (NaN where not known). ``words`` say more than the status alone."""
 
     name: str
     value: float
     unit: str
     status: int
     error: float = math.nan
+    averages: float = math.nan
+    words: str = ""
 
     @property
     def text(self) -> str:
         """The status in words."""
-        return Status(self.status).text
+        return self.words or Status(self.status).text
+
+    @property
+    def half_width(self) -> float:
+        """Half of the interval that holds the value with 95 %, by Student's t; NaN where it is not known."""
+        return float(self.error * student_factor(self.averages))
 
 
 @dataclass(frozen=True)
@@ -118,19 +130,25 @@ def quickness_reading(history: TimeHistory, axis: str, boundaries: Boundaries) -
     )  # fmt: skip
 
 
-def stability_reading(history: TimeHistory, axis: str, boundaries: Boundaries) -> Reading:
-    """Damping ratio and natural frequency of one pulse."""
+def stability_reading(history: TimeHistory, axis: str, boundaries: Boundaries, returns_in: float) -> Reading:
+    """Damping ratio and natural frequency of one pulse; undefined where its control came back (s) too slowly."""
     found = dynamic_stability(history, axis, boundaries=boundaries)  # type: ignore[arg-type]
     limits = boundaries.dynamic_stability
     level, delay = int(found.level[0]), float(history.delay[0])
+    values = [
+        Value("zeta", float(found.zeta[0]), "1", int(found.status[0])),
+        Value("omega_n", float(found.omega_n[0]), "rad/s", int(found.status_omega[0])),
+        Value("damped_period", float(found.damped_period[0]), "s", int(found.status_omega[0])),
+        Value("peak_ratio", float(found.peak_ratio[0]), "1", int(found.status[0])),
+    ]
+    period = 2.0 * float(found.times[0, 1] - found.times[0, 0])
+    if returns_in > SHARP * period:
+        words = f"the control comes back over {returns_in:.3g} s, more than a quarter of the period ({period:.3g} s): it drives on"
+        values = [replace(each, value=math.nan, status=int(Status.STILL_DRIVEN), words=words) for each in values]
+        level = int(Level.UNDEFINED)
     return Reading(
         "dynamic_stability", RATE_AND_ATTITUDE[axis][0], axis, history.name,
-        (
-            Value("zeta", float(found.zeta[0]), "1", int(found.status[0])),
-            Value("omega_n", float(found.omega_n[0]), "rad/s", int(found.status_omega[0])),
-            Value("damped_period", float(found.damped_period[0]), "s", int(found.status_omega[0])),
-            Value("peak_ratio", float(found.peak_ratio[0]), "1", int(found.status[0])),
-        ),
+        tuple(values),
         level, level, limits.name, limits.verified,
         _times(found.picks, ("first_peak", "first_valley", "second_peak")) | {"free": history.input_off + delay},
         (f"taken as free from {history.input_off + delay:.3f} s on, {delay:.3g} s after the end of the input",),

@@ -14,13 +14,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from levelone.config.data_files import Column, DataFile, FloatArray, name_and_unit
+from levelone.config.data_files import DataFile, FloatArray, name_and_unit
 from levelone.config.files import read_toml
 from levelone.config.units import to_si
 from levelone.errors import InputError, unknown_name
@@ -38,8 +38,8 @@ CHANNELS: dict[str, str] = {
 TIMES = ("time", "t", "timestamp")
 """Names under which a column of time is found when none is given, in any case."""
 
-_OPERATIONS = re.compile(r"^(.*?\S)\s*((?:[*/]\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*)+)$")
-_OPERATION = re.compile(r"([*/])\s*([+-]?[\d.]+(?:[eE][+-]?\d+)?)")
+_LAST = re.compile(r"^(.*\S)\s*([*/])\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*$")
+"""A name, and the last operation behind it."""
 _KEYS = ("name", "unit", "sign", "scale", "offset")
 
 
@@ -48,6 +48,7 @@ class Source:
     """Where a channel comes from: SI value = (``factor`` times the column + ``offset``), turned from ``unit`` into SI.
 
     ``unit`` is empty where the file's own counts, and ``name`` may still carry it in brackets. ``field`` is what an error names.
+    ``text`` is what the user wrote for name and factor in one, until :func:`in_file` has found what of it is the name.
     """
 
     channel: str
@@ -56,6 +57,7 @@ class Source:
     factor: float = 1.0
     offset: float = 0.0
     field: str = "--columns"
+    text: str = ""
 
 
 def parse_columns(text: str, field: str = "--columns") -> dict[str, Source]:
@@ -73,15 +75,19 @@ def parse_columns(text: str, field: str = "--columns") -> dict[str, Source]:
             raise InputError(field, f"{part.strip()!r} is not CHANNEL=COLUMN; write it like theta=pitch_angle[deg]")
         _check_channel(channel, field, found)
         name, factor = column, 1.0
-        split = _OPERATIONS.match(column)
-        if split is not None:
-            name = split[1]
-            for operator, number in _OPERATION.findall(split[2]):
-                factor *= float(number) if operator == "*" else 1.0 / float(number) if float(number) else math.inf
+        while (split := _LAST.match(name)) is not None:
+            name, factor = split[1], factor * _factor(split)
         if not (math.isfinite(factor) and factor != 0.0):
             raise InputError(f"{field}: {channel}", f"{column!r} multiplies by {factor:g}; must be finite and not zero")
-        found[channel] = Source(channel, name, factor=factor, field=f"{field}: {channel}")
+        found[channel] = Source(channel, name, factor=factor, field=f"{field}: {channel}", text=column)
     return found
+
+
+def _factor(operation: re.Match[str]) -> float:
+    number = float(operation[3])
+    if operation[2] == "*":
+        return number
+    return 1.0 / number if number else math.inf
 
 
 def read_mapping(path: Path) -> dict[str, Source]:
@@ -149,8 +155,22 @@ def source_of_time(file: DataFile, mapping: Mapping[str, Source]) -> Source | No
     raise InputError(str(file.path), "has no column of time; name it: time=COLUMN[s]")
 
 
+def in_file(file: DataFile, source: Source) -> Source:
+    """The source with the name that the file has: a column that bears the longest part of what was written, ``gyro/2`` before
+    half of ``gyro``."""
+    name, factor = source.text, 1.0
+    while name:
+        if name in file.columns or name_and_unit(name)[0] in file.columns:
+            return replace(source, name=name, factor=factor, text="")
+        split = _LAST.match(name)
+        if split is None:
+            break
+        name, factor = split[1], factor * _factor(split)
+    return source
+
+
 def series(file: DataFile, source: Source) -> tuple[FloatArray, FloatArray | None, str]:
-    """Values of a channel in SI, the clock of its column, and the unit they were read in.
+    """Values of a channel in SI, the clock of its column, and the unit they were read in; the source as of :func:`in_file`.
 
     Raises
     ------
@@ -181,8 +201,3 @@ def _name_in(file: DataFile, source: Source) -> tuple[str, str]:
         return source.name, source.unit
     name, unit = name_and_unit(source.name)
     return name, source.unit or unit
-
-
-def column_of(file: DataFile, source: Source) -> Column:
-    """The column that a source names."""
-    return file.column(_name_in(file, source)[0], source.field)

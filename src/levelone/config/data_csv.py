@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from levelone.config.data_files import Column, Content, FloatArray, name_and_unit, unique
+from levelone.config.data_files import NO_UNIT, Column, Content, FloatArray, names_and_units, unique
 from levelone.errors import InputError
 
 DELIMITERS = (",", ";", "\t")
@@ -45,12 +45,13 @@ def read_csv(path: Path, content: bytes) -> Content:
     header = _cells(numbered[0][1], delimiter)
     if all(_is_number(cell) for cell in header):
         raise InputError(f"{path}: line {numbered[0][0]}", "holds numbers where the names of the columns are expected")
-    parts = [name_and_unit(cell) for cell in header]
+    parts = names_and_units(header)
     names, units = unique(path, [name for name, _ in parts]), [unit for _, unit in parts]
-    second = _cells(numbered[1][1], delimiter)
+    second, third = (_cells(line, delimiter) for _, line in numbered[1:3])
     body = numbered[1:]
-    if len(second) == len(header) and not any(_is_number(cell) or not cell for cell in second):
-        units = [given or cell.strip("[]() ") for given, cell in zip(units, second, strict=True)]
+    if _are_units(second, third, len(header)):
+        stated = [cell.strip("[]() ") for cell in second]
+        units = [given or ("1" if unit in NO_UNIT else unit) for given, unit in zip(units, stated, strict=True)]
         body = numbered[2:]
     if delimiter != "," and any("," in line for _, line in body[:50]):
         body = [(number, line.replace(",", ".")) for number, line in body]
@@ -105,6 +106,15 @@ def _numbers(path: Path, body: Sequence[tuple[int, str]], width: int, delimiter:
             except ValueError:
                 problems.setdefault(column, f"line {number} holds {cell[:40]!r}")
     return table, problems
+
+
+def _are_units(cells: Sequence[str], below: Sequence[str], width: int) -> bool:
+    """Whether a row states units: words, ``1`` or nothing in every cell, and no word where the next row has one as well."""
+    if not len(cells) == len(below) == width:
+        return False
+    words = [bool(cell) and not _is_number(cell) for cell in cells]
+    stated = all(word or cell in ("", "1") for word, cell in zip(words, cells, strict=True))
+    return stated and any(words) and all(not word or not cell or _is_number(cell) for word, cell in zip(words, below, strict=True))
 
 
 def _is_number(text: str) -> bool:

@@ -23,6 +23,8 @@ FloatArray = NDArray[np.float64]
 
 LARGEST = 2**30
 """bytes: larger files are refused before they are read."""
+NO_UNIT = ("-", "–", "−")
+"""How files write the unit of a pure number."""
 _UNIT = re.compile(r"^\s*(.*?\S)\s*(?:\[([^\[\]]*)\]|(?<=\s)\(([^()]*)\))\s*$")
 
 
@@ -144,7 +146,19 @@ def name_and_unit(text: str) -> tuple[str, str]:
     unit = "" if found is None else (found[2] if found[2] is not None else found[3]).strip()
     if found is None or (unit.isdigit() and unit != "1"):
         return text.strip(), ""
-    return found[1], unit
+    return found[1], "1" if unit in NO_UNIT else unit
+
+
+def names_and_units(texts: Iterable[str]) -> list[tuple[str, str]]:
+    """Names and units of all columns of a file: ``xyz[1]`` is an element where the file has ``xyz[0]`` or ``xyz[2]``, too."""
+    cells = [text.strip() for text in texts]
+    known = set(cells)
+    found = []
+    for cell in cells:
+        name, unit = name_and_unit(cell)
+        element = unit == "1" and cell.endswith("[1]") and not known.isdisjoint({f"{cell[:-3]}[0]", f"{cell[:-3]}[2]"})
+        found.append((cell, "") if element else (name, unit))
+    return found
 
 
 def unique(path: Path, names: Iterable[str]) -> list[str]:

@@ -60,19 +60,19 @@ def _of_hdf5(content: bytes) -> Iterator[tuple[str, Any]]:
     import h5py
 
     with h5py.File(io.BytesIO(content), "r") as file:
-        for name, item in file.items():
-            if not name.startswith("#"):
-                yield from _of_group(h5py, name, item)
+        yield from _of_group(h5py, "", file)
 
 
-def _of_group(h5py: Any, name: str, item: Any) -> Iterator[tuple[str, Any]]:
-    if isinstance(item, h5py.Group):
-        for key in item:
-            # links to other files are not followed: nothing is read that the user has not named
-            if isinstance(item.get(key, getlink=True), h5py.HardLink):
-                yield from _of_group(h5py, f"{name}.{key}", item[key])
-    elif isinstance(item, h5py.Dataset) and item.dtype.kind in "iufb" and not item.external:
-        yield from _vectors(name, np.asarray(item[()]).T)
+def _of_group(h5py: Any, prefix: str, group: Any) -> Iterator[tuple[str, Any]]:
+    """Arrays below a group. What lies in other files is passed over: nothing is read that the user has not named."""
+    for key in group:
+        if key.startswith("#") or not isinstance(group.get(key, getlink=True), h5py.HardLink):
+            continue
+        name, item = f"{prefix}{key}", group[key]
+        if isinstance(item, h5py.Group):
+            yield from _of_group(h5py, f"{name}.", item)
+        elif isinstance(item, h5py.Dataset) and item.dtype.kind in "iufb" and not (item.is_virtual or item.external):
+            yield from _vectors(name, np.asarray(item[()]).T)
 
 
 def _vectors(name: str, item: Any) -> Iterator[tuple[str, Any]]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from levelone.config.data_files import Column, Content, name_and_unit, unique
+from levelone.config.data_files import Column, Content, names_and_units, unique
 from levelone.errors import InputError
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
@@ -35,7 +35,8 @@ def read_parquet(path: Path, content: bytes) -> Content:
         raise InputError(str(path), "Parquet files need the library pyarrow: pip install levelone[records]") from None
     try:
         table = parquet.read_table(io.BytesIO(content))
-        parts = [_stated(field) for field in table.schema]
+        columns = zip(table.schema, names_and_units(table.schema.names), strict=True)
+        parts = [(name, _stated(field) or unit) for field, (name, unit) in columns]
         names = unique(path, [name for name, _ in parts])
         series = [_values(arrow, column) for column in table.columns]
     except InputError:
@@ -46,11 +47,9 @@ def read_parquet(path: Path, content: bytes) -> Content:
     return {name: Column(values, unit or given) for name, (_, given), (values, unit) in known if values is not None}, {}, ()
 
 
-def _stated(field: Any) -> tuple[str, str]:
-    name, unit = name_and_unit(field.name)
+def _stated(field: Any) -> str:
     metadata = field.metadata or {}
-    stated = metadata.get(b"unit", metadata.get(b"units", b"")).decode("utf-8", "replace")
-    return name, stated or unit
+    return str(metadata.get(b"unit", metadata.get(b"units", b"")).decode("utf-8", "replace"))
 
 
 def _values(arrow: Any, column: Any) -> tuple[Any, str]:
@@ -62,7 +61,8 @@ def _values(arrow: Any, column: Any) -> tuple[Any, str]:
         first = whole[0] if kind.is_timestamp(column.type) and len(whole) else 0
         return np.asarray(whole - first, dtype=np.float64) * _SECONDS[column.type.unit], "s"
     if any(is_kind(column.type) for is_kind in (kind.is_integer, kind.is_floating, kind.is_decimal, kind.is_boolean)):
-        return np.array(column.cast(arrow.float64()).to_numpy(), dtype=np.float64), ""
+        # counts beyond 2^53 lose their last digits: 256 ns of a clock in ns since 1970
+        return np.array(column.cast(arrow.float64(), safe=False).to_numpy(), dtype=np.float64), ""
     return None, ""
 
 

@@ -8,20 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from levelone.config.column_mapping import CHANNELS, Source, series, source_of_time
+from levelone.config.column_mapping import Source, in_file, series, source_of_time
 from levelone.config.data_files import DataFile, FloatArray
 from levelone.errors import InputError
+from levelone.handling.axes import without_jumps
 from levelone.handling.history import UNIFORM
 
 LARGEST_GAP = 5.0
 """Intervals between two samples over which is interpolated unless told otherwise."""
 FAR = 1e6
 """s: a clock that begins beyond this counts from another age; times are then counted from the first sample."""
+SLOW = 0.5
+"""Interval from which on a clock must state its unit: no manoeuvre is recorded that slowly, a clock in ms or us looks like it."""
 MOST_SAMPLES = 50_000_000
 """Samples of one channel after resampling; more is a slip in the clock."""
 _EDGE = 1e-9
 """s: rounding of a clock that does not put a sample out of the window."""
-_ANGLES = ("phi", "psi", "phi_ref", "psi_ref")
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +35,11 @@ class Table:
     time
         ``[sample]``, s, uniform.
     channels
-        ``[sample]`` each, SI and rad, finite.
+        ``[sample]`` each, SI and rad, finite; headings and bank angles without jumps.
+    sources
+        Where each channel and ``time`` (if the file has one column of it) come from, by the names that the file has.
     units
-        The unit that each channel was read in; empty where neither the file nor the mapping states one, and SI was taken.
+        The unit that each of them was read in; empty where neither the file nor the mapping states one, and SI was taken.
     largest_gap
         s between two neighbouring samples of the file.
     resampled
@@ -46,6 +50,7 @@ class Table:
 
     time: FloatArray
     channels: Mapping[str, FloatArray]
+    sources: Mapping[str, Source]
     units: Mapping[str, str]
     largest_gap: float
     resampled: bool
@@ -83,14 +88,19 @@ def tabulate(
     Raises
     ------
     InputError
-        Times that are missing, repeated or go back; a window without samples; a gap larger than allowed; a missing value.
+        Times that are missing, repeated or go back; a clock without a unit that would be too slow in s; a window without
+        samples; a gap larger than allowed; a missing value.
 
     Notes
     -----
-    Values between samples are linear. Headings and bank angles are unwrapped before.
+    Values between samples are linear. Headings and bank angles are unwrapped before, and whether or not it is interpolated.
     """
-    time_of_file = _clock_of_file(file, mapping)
-    read = {name: series(file, source) for name, source in mapping.items() if name != "time"}
+    sources = {name: in_file(file, source) for name, source in mapping.items()}
+    clock_source = source_of_time(file, sources)
+    time_of_file, units = _clock_of_file(file, clock_source)
+    if clock_source is not None:
+        sources = {"time": clock_source} | sources
+    read = {name: series(file, source) for name, source in sources.items() if name != "time"}
     if not read:
         raise InputError(str(file.path), "no channel is taken from it; map at least an input and a response")
     clocks: dict[str, FloatArray] = {}
@@ -109,12 +119,27 @@ def tabulate(
     if time_of_file is not None and time[0] > FAR:
         notes.append(f"the clock begins at {time[0]:.0f} s: times are counted from there")
         time = time - time[0]
-    return Table(time, channels, {name: unit for name, (_, _, unit) in read.items()}, max(gaps.values()), resampled, tuple(notes))
+    units |= {name: unit for name, (_, _, unit) in read.items()}
+    return Table(time, channels, sources, units, max(gaps.values()), resampled, tuple(notes))
 
 
-def _clock_of_file(file: DataFile, mapping: Mapping[str, Source]) -> FloatArray | None:
-    source = source_of_time(file, mapping)
-    return None if source is None else series(file, source)[0]
+def _clock_of_file(file: DataFile, source: Source | None) -> tuple[FloatArray | None, dict[str, str]]:
+    """The column of time, s, and the unit that it was read in; none where every column has its own.
+
+    A clock in ms or us that is taken for one in s makes an aircraft of milliradians a second, with a Level.
+    """
+    if source is None:
+        return None, {}
+    clock, _, unit = series(file, source)
+    interval = float(np.median(np.diff(clock))) if clock.size > 1 else 0.0
+    if not unit and interval >= SLOW:
+        usual = "us" if source.name.lower().startswith("timestamp") else "ms"
+        raise InputError(
+            source.field,
+            f"{file.path.name}: its samples are {interval:.6g} apart, which as seconds is no record of a manoeuvre: "
+            f"state its unit: time={source.name}[{usual}] or [s]",
+        )
+    return clock, {"time": unit}
 
 
 def _window(
@@ -177,10 +202,9 @@ def _uniform(file: DataFile, clocks: Mapping[str, FloatArray], fastest: str, dt:
 
 
 def _resampled(time: FloatArray, clock: FloatArray, values: FloatArray, name: str, resampled: bool) -> FloatArray:
-    if not resampled:
-        return values
-    straight = np.unwrap(values) if name in _ANGLES and CHANNELS[name] == "rad" else values
-    return np.interp(time, clock, straight)
+    """Values on the common clock; an angle that may wrap goes on without jumps, for its mean and its changes count."""
+    straight = without_jumps(name, values)
+    return np.interp(time, clock, straight) if resampled else straight
 
 
 def _notes(

@@ -113,7 +113,6 @@ def added_dynamics(
     omega_max: float = OMEGA[1],
     points: int = POINTS,
     coherence_min: float = COHERENCE_MIN,
-    align_gain: bool = False,
 ) -> AddedDynamics:
     """Whether a pilot would notice what sets a simulated response apart from a flown one.
 
@@ -121,24 +120,13 @@ def added_dynamics(
     ----------
     simulation, flight, omega_min, omega_max, points, coherence_min
         As for :func:`~levelone.handling.mismatch.response_error`; the range is cut to what both responses hold.
-    align_gain
-        Take the mean error of the gain off first: a constant factor is what a pilot gets used to. Off by default, since a
-        simulation of a known stick has no right to a free gain.
 
     Raises
     ------
     InputError
         As :func:`~levelone.handling.mismatch.response_error`.
     """
-    error = response_error(
-        simulation,
-        flight,
-        omega_min=omega_min,
-        omega_max=omega_max,
-        points=points,
-        coherence_min=coherence_min,
-        align_gain=align_gain,
-    )
+    error = response_error(simulation, flight, omega_min=omega_min, omega_max=omega_max, points=points, coherence_min=coherence_min)
     bounds = envelopes(error.omega)
     with np.errstate(invalid="ignore"):
         inside_gain = (error.gain >= bounds.gain_below) & (error.gain <= bounds.gain_above)

@@ -14,6 +14,8 @@ RotationAxis = Literal["pitch", "roll", "yaw"]
 RATE_AND_ATTITUDE = {"pitch": ("q", "theta"), "roll": ("p", "phi"), "yaw": ("r", "psi")}
 """Channels of each axis."""
 
+MAY_WRAP = ("phi", "psi", "phi_ref", "psi_ref")
+"""Channels, rad, that may be recorded within a turn."""
 STEADY = 0.1
 """Largest change before the input, as a fraction of the first peak, that still counts as trim."""
 
@@ -23,10 +25,22 @@ def rotation(history: TimeHistory, axis: str) -> tuple[FloatArray, FloatArray]:
     if axis not in RATE_AND_ATTITUDE:
         raise unknown_name("axis", str(axis), RATE_AND_ATTITUDE)
     rate, attitude = (history.change(channel) for channel in RATE_AND_ATTITUDE[axis])
-    if axis == "yaw":  # a heading may be recorded within half a turn
-        attitude = np.unwrap(attitude, axis=1)
-        attitude -= 2.0 * np.pi * np.round(attitude[:, :1] / (2.0 * np.pi))
+    if axis == "yaw":
+        attitude = continuous(attitude)
     return np.ascontiguousarray(rate), np.ascontiguousarray(attitude)
+
+
+def continuous(heading: FloatArray) -> FloatArray:
+    """Change of a heading that may be recorded within a turn, ``[run, time]``, rad: without jumps, its first sample within half
+    a turn of trim."""
+    with np.errstate(invalid="ignore"):
+        turned = np.unwrap(heading, axis=1)
+        return np.asarray(turned - 2.0 * np.pi * np.round(turned[:, :1] / (2.0 * np.pi)), dtype=np.float64)
+
+
+def without_jumps(channel: str, values: FloatArray) -> FloatArray:
+    """Values of a channel, ``[time]``; of one that may wrap, without whole turns between samples, so that it has a mean."""
+    return np.unwrap(values) if channel in MAY_WRAP else values
 
 
 def run_failures(history: TimeHistory) -> IntArray:

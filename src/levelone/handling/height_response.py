@@ -12,8 +12,9 @@ over the same 5 s. It must lie between 0.97 and 1.03 (it is no correlation and m
 none of a first order, and no Level is given. Level 1 asks for T up to 5 s and tau up to 0.20 s, Level 2 for tau up to 0.30 s
 with any T.
 
-The fit follows the control as it was recorded, held between samples: a step that the pilot takes 0.2 s to make adds
-nothing to tau.
+The fit follows the control as it was recorded, held between samples, from the first sample of the record on: a step that
+the pilot takes his time to make does not count as delay, provided that the trim is that of before its first movement. Held
+between samples, a ramp is followed half a sampling interval late: tau then comes out smaller by that.
 """
 
 from __future__ import annotations
@@ -117,7 +118,7 @@ def height_response(
     status = _statuses(history, climb, source, start, end)
     fits = np.full((history.n_runs, 4), np.nan)
     for run in np.flatnonzero(status == Status.OK):
-        fits[run] = _fit(climb[run, start:end], source[run, start:end], history.dt, window)
+        fits[run] = _fit(climb[run, start:end], source[run, :end], history.dt, window)
     gain, time_constant, delay, determination = np.ascontiguousarray(fits.T)
     low, high = DETERMINATION
     outside = (status == Status.OK) & ~((determination >= low) & (determination <= high))
@@ -174,7 +175,7 @@ def _statuses(history: TimeHistory, climb: FloatArray, source: FloatArray, start
         before = np.abs(climb[:, :start]).max(axis=1, initial=0.0)
         early = np.abs(source[:, :start]).max(axis=1, initial=0.0)
         unsteady = ~(before <= STEADY * moved) | ~(early <= STEADY * largest)
-    gone = ~(np.isfinite(inside).all(axis=1) & np.isfinite(given).all(axis=1))
+    gone = ~(np.isfinite(inside).all(axis=1) & np.isfinite(source[:, :end]).all(axis=1))
     return np.select(
         [failures != Status.OK, gone, ~stays, unsteady, ~(moved > 0.0)],
         [failures, Status.RECORD_TOO_SHORT, Status.NO_STEADY_COMMAND, Status.NOT_AT_TRIM, Status.MODEL_FAILED],
@@ -183,11 +184,12 @@ def _statuses(history: TimeHistory, climb: FloatArray, source: FloatArray, start
 
 
 def _fit(climb: FloatArray, source: FloatArray, dt: float, window: float) -> tuple[float, float, float, float]:
-    """K, T, tau and r^2 of one run."""
+    """K, T, tau and r^2 of one run; the input is that of the whole record up to the end of the window."""
     size = float(np.linalg.norm(climb))
+    first = source.size - climb.size
 
     def gain_and_shape(parameters: FloatArray) -> tuple[float, FloatArray]:
-        shape = first_order(source, math.exp(parameters[0]), float(parameters[1]), dt)
+        shape = first_order(source, math.exp(parameters[0]), float(parameters[1]), dt)[first:]
         power = float(shape @ shape)
         return (float(shape @ climb) / power if power > 0.0 else 0.0), shape
 

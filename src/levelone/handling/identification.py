@@ -21,11 +21,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft, signal
 
 from levelone.errors import InputError, unknown_name
-from levelone.handling.axes import run_failures
+from levelone.handling.axes import continuous, run_failures
 from levelone.handling.frequency import ComplexArray, FrequencyResponse
 from levelone.handling.history import FloatArray, TimeHistory
 
@@ -135,11 +136,7 @@ def input_and_output(history: TimeHistory, output: str, input_name: str | None, 
         raise InputError("sign", f"is {sign}, must be 1 or -1")
     source = history.change(history.input_name if input_name is None else input_name)
     answer = history.change(output)
-    if output == "psi":  # a heading may be recorded within half a turn
-        with np.errstate(invalid="ignore"):
-            answer = np.unwrap(answer, axis=1)
-            answer -= 2.0 * np.pi * np.round(answer[:, :1] / (2.0 * np.pi))
-    return source, sign * answer
+    return source, sign * (continuous(answer) if output == "psi" else answer)
 
 
 def segmentation(
@@ -196,10 +193,8 @@ def composite(spectra: list[Spectra], independent: list[float]) -> tuple[Complex
     ``independent`` is the number of segments of each length that would fit side by side.
     """
     coherences = [_coherence(*each) for each in spectra]
-    errors = [
-        np.sqrt(np.maximum(1.0 - gamma2, 1e-12)) / np.sqrt(np.maximum(gamma2, 1e-12) * 2.0 * count)
-        for gamma2, count in zip(coherences, independent, strict=True)
-    ]
+    # neither no nor full coherence may weigh without bound
+    errors = [noise_part(np.clip(gamma2, 1e-12, 1.0 - 1e-12), n) for gamma2, n in zip(coherences, independent, strict=True)]
     least = np.min(errors, axis=0)
     weights = [(least / error) ** 8 for error in errors]
     total = np.sum(weights, axis=0)
@@ -210,6 +205,12 @@ def composite(spectra: list[Spectra], independent: list[float]) -> tuple[Complex
     value = np.full(cross.shape, np.nan + 0j)
     value[excited] = cross[excited] / auto_x[excited]
     return value, np.where(excited, _coherence(auto_x, auto_y, cross), np.nan), np.asarray(weights) / total
+
+
+def noise_part(gamma2: FloatArray, averages: npt.ArrayLike) -> FloatArray:
+    """Random error of a gain, as a fraction of it, and of a phase, rad, at a coherence, from so many independent averages."""
+    with np.errstate(divide="ignore"):
+        return np.sqrt(np.maximum(1.0 - gamma2, 0.0) / (2.0 * np.asarray(averages) * gamma2))
 
 
 def _coherence(auto_x: FloatArray, auto_y: FloatArray, cross: ComplexArray) -> FloatArray:

@@ -34,7 +34,15 @@ from levelone.errors import InputError
 from levelone.handling.axes import run_failures
 from levelone.handling.frequency import FrequencyResponse
 from levelone.handling.history import FloatArray, IntArray, TimeHistory
-from levelone.handling.identification import Segmentation, Spectra, composite, input_and_output, record_spectra, segmentation
+from levelone.handling.identification import (
+    Segmentation,
+    Spectra,
+    composite,
+    input_and_output,
+    noise_part,
+    record_spectra,
+    segmentation,
+)
 from levelone.status import Status
 
 SAME_DT = 1e-4
@@ -74,19 +82,27 @@ class Identified:
         """Half-width of the band that holds the response at each frequency, ``[frequency]``: of the gain as a fraction, of the
         phase in rad.
 
-        Noise is estimated from the same few averages: the band is that of Student's t with 2 n - 2 degrees of freedom (real
-        and imaginary part of n averages, less those of the response itself), wider than the normal one by little once n is
-        above 10.
-
-        Raises
-        ------
-        InputError
-            A probability that does not lie between 0 and 1.
+        See :func:`student_factor`.
         """
-        if not 0.0 < probability < 1.0:
-            raise InputError("probability", f"is {probability}, must lie between 0 and 1")
-        spare = np.where(self.averages > 1.0, self.averages - 1.0, np.nan)
-        return self.error * np.sqrt(self.averages / spare) * special.stdtrit(2.0 * spare, 0.5 + 0.5 * probability)
+        return self.error * student_factor(self.averages, probability)
+
+
+def student_factor(averages: npt.ArrayLike, probability: float = 0.95) -> FloatArray:
+    """Half-width of a band over the standard deviation that was estimated from ``averages`` independent ones; NaN up to one.
+
+    Noise is estimated from the same few averages: the band is that of Student's t with 2 n - 2 degrees of freedom (real and
+    imaginary part of n averages, less those of the response itself), wider than the normal one by little once n is above 10.
+
+    Raises
+    ------
+    InputError
+        A probability that does not lie between 0 and 1.
+    """
+    if not 0.0 < probability < 1.0:
+        raise InputError("probability", f"is {probability}, must lie between 0 and 1")
+    count = np.asarray(averages, dtype=np.float64)
+    spare = np.where(count > 1.0, count - 1.0, np.nan)
+    return np.asarray(np.sqrt(count / spare) * special.stdtrit(2.0 * spare, 0.5 + 0.5 * probability), dtype=np.float64)
 
 
 def identify_records(
@@ -167,9 +183,7 @@ def random_error(response: FrequencyResponse, averages: npt.ArrayLike) -> FloatA
     if (count < 1.0).any():
         raise InputError("averages", f"is {count.min():.4g}, must be 1 or more: lengthen the record or shorten the windows")
     gamma2 = np.broadcast_to(response.coherence, response.value.shape)
-    with np.errstate(divide="ignore"):
-        error = np.sqrt(np.maximum(1.0 - gamma2, 0.0) / (2.0 * count * gamma2))
-    return np.where(np.isnan(response.value), np.nan, error)
+    return np.where(np.isnan(response.value), np.nan, noise_part(gamma2, count))
 
 
 def independent_averages(weights: FloatArray, plan: Segmentation, samples: int) -> FloatArray:

@@ -8,7 +8,6 @@ what its own input achieved on one side, so that the value is the achievable one
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
@@ -24,6 +23,7 @@ from levelone.handling.bandwidth import ResponseType
 from levelone.handling.history import FloatArray, IntArray, TimeHistory
 from levelone.handling.levels import Confidence, Level
 from levelone.handling.peaks import extrema
+from levelone.handling.toml_files import read_toml_file, subtable
 from levelone.status import Status
 
 Agility = Literal["limited", "moderate", "aggressive"]
@@ -154,9 +154,10 @@ def amplitude_limits(axis: str, response_type: str, agility: str, path: str | Pa
             raise unknown_name(field, str(value), allowed)
     content = _content(None if path is None else str(path))
     where = f"{content.get('name', DEFAULT)}: {axis}.{response_type}"
-    entry = content.get(axis, {}).get(response_type, {}).get(agility)
-    if entry is None:
+    group = subtable(subtable(content.get(axis, {}), where).get(response_type, {}), where)
+    if agility not in group:
         raise InputError(where, f"no requirement for {agility} agility is stated")
+    entry = subtable(group[agility], f"{where}.{agility}")
     if entry.get("confidence") not in get_args(Confidence):
         raise unknown_name(f"{where}.{agility}.confidence", str(entry.get("confidence")), get_args(Confidence))
     return AmplitudeLimits(
@@ -173,12 +174,7 @@ def amplitude_limits(axis: str, response_type: str, agility: str, path: str | Pa
 @cache
 def _content(path: str | None) -> dict[str, Any]:
     source = Path(path) if path is not None else resources.files("levelone.handling").joinpath(f"library/{DEFAULT}.toml")
-    try:
-        return tomllib.loads(source.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(str(source), f"cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(source), f"is not a TOML file: {error}") from error
+    return read_toml_file(source, str(source))
 
 
 def _sides(field: str, value: object) -> tuple[float, float]:

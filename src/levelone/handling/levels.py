@@ -6,7 +6,6 @@ Boundaries are data: the file that ships, ``library/ads33-levels.toml``, or one 
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
@@ -21,6 +20,7 @@ import numpy.typing as npt
 
 from levelone.errors import InputError, unknown_name
 from levelone.handling.history import FloatArray, IntArray
+from levelone.handling.toml_files import read_toml_file, subtable
 
 Confidence = Literal["high", "medium", "low"]
 DEFAULT = "ads33-levels"
@@ -188,18 +188,12 @@ def load_boundaries(path_or_name: str | PathLike[str] = DEFAULT) -> Boundaries:
     if where not in shipped and not where.endswith(".toml"):
         raise unknown_name("boundaries", where, shipped)
     source = shipped[where] if where in shipped else Path(where)
-    try:
-        content = tomllib.loads(source.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(where, f"cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(where, f"is not a TOML file: {error}") from error
-    return _boundaries(where, content)
+    return _boundaries(where, read_toml_file(source, where))
 
 
 def _boundaries(where: str, content: dict[str, Any]) -> Boundaries:
     def charts(criterion: str, unit: str, factor: float) -> dict[str, Chart]:
-        group = content.get(criterion, {})
+        group = subtable(content.get(criterion, {}), f"{where}: {criterion}")
         return {key: _chart(f"{where}: {criterion}.{key}", table, unit, factor) for key, table in group.items()}
 
     known = ("schema", "name", "source", "attitude_quickness", "bandwidth", "dynamic_stability", "limits")
@@ -210,19 +204,20 @@ def _boundaries(where: str, content: dict[str, Any]) -> Boundaries:
         raise InputError(f"{where}: schema", f"is {content.get('schema')!r}, must be 1")
     if "dynamic_stability" not in content:
         raise InputError(f"{where}: dynamic_stability", "missing")
+    limits = subtable(content.get("limits", {}), f"{where}: limits")
     return Boundaries(
         name=str(content.get("name", where)),
         source=str(content.get("source", "")),
         attitude_quickness=charts("attitude_quickness", "deg", math.pi / 180.0),
         bandwidth=charts("bandwidth", "s", 1.0),
         dynamic_stability=_damping(f"{where}: dynamic_stability", content["dynamic_stability"]),
-        limits=content.get("limits", {}),
+        limits={key: subtable(table, f"{where}: limits.{key}") for key, table in limits.items()},
     )
 
 
 def _chart(name: str, table: dict[str, Any], unit: str, factor: float) -> Chart:
     keys = ("level_1_2", "level_2_3", f"range_{unit}", "confidence", "source", "note")
-    for key in table:
+    for key in subtable(table, name):
         if key not in keys:
             raise unknown_name(name, key, keys)
     low_high = _numbers(f"{name}.{keys[2]}", table.get(keys[2]), (2,))
@@ -243,7 +238,7 @@ def _chart(name: str, table: dict[str, Any], unit: str, factor: float) -> Chart:
 def _damping(name: str, table: dict[str, Any]) -> DampingLimits:
     numbers = ("zeta_1", "corner", "zeta_below_corner", "growth")
     keys = (*numbers, "confidence", "confidence_zeta_1", "source", "note")
-    for key in table:
+    for key in subtable(table, name):
         if key not in keys:
             raise unknown_name(name, key, keys)
     values = {key: float(_numbers(f"{name}.{key}", table.get(key), ())) for key in numbers}

@@ -52,8 +52,6 @@ class ResponseError:
         ``[point]``, rad: simulation ahead of flight, continuous over frequency, in (-pi, pi] at the first point that can be read.
     coherence
         ``[point]``: the smaller of both, 1 for an exact response.
-    gain_offset
-        dB: what was taken off the gain's error to align both; 0 where they were not aligned.
     status
         Why no point can be read; otherwise ``OK``.
     """
@@ -62,7 +60,6 @@ class ResponseError:
     gain: FloatArray
     phase: FloatArray
     coherence: FloatArray
-    gain_offset: float
     status: Status
 
     @property
@@ -116,7 +113,6 @@ def response_error(
     omega_max: float | None = None,
     points: int = POINTS,
     coherence_min: float = COHERENCE_MIN,
-    align_gain: bool = False,
 ) -> ResponseError:
     """Errors of a simulated response against a flown one, at frequencies that both hold.
 
@@ -130,9 +126,6 @@ def response_error(
         Number of frequencies.
     coherence_min
         Least coherence of either response at a frequency that is compared.
-    align_gain
-        Take the mean error of the gain off, as is usual where a pilot would adapt to a constant factor (equivalent systems,
-        unnoticeable dynamics); the offset is reported. Never for the cost J, which a wrong gain must raise.
 
     Raises
     ------
@@ -155,18 +148,12 @@ def response_error(
     gain[read] = 20.0 * np.log10(np.abs(ratio[read]))
     phase[read] = np.unwrap(np.angle(ratio[read]))
     coherence = np.minimum(_coherence(simulation, omega), _coherence(flight, omega))
-    offset = float(np.mean(gain[read])) if align_gain and read.any() else 0.0
     status = Status.OK if read.any() else _why_not(simulation, flight)
-    return ResponseError(omega, gain - offset, phase, np.where(read, coherence, np.nan), offset, status)
+    return ResponseError(omega, gain, phase, np.where(read, coherence, np.nan), status)
 
 
 def mismatch_cost(error: ResponseError) -> Mismatch:
     """Cost J of one pair of responses from their errors.
-
-    Raises
-    ------
-    InputError
-        The errors are of responses whose gain was aligned.
 
     Examples
     --------
@@ -175,8 +162,6 @@ def mismatch_cost(error: ResponseError) -> Mismatch:
     >>> print(f"{mismatch_cost(response_error(flight.scaled(10.0 ** 0.1), flight)).cost:.2f}")
     79.80
     """
-    if error.gain_offset != 0.0:
-        raise InputError("align_gain", f"took {error.gain_offset:.3g} dB off the error: the cost J is that of the whole error")
     if error.status is not Status.OK:
         return Mismatch(math.nan, math.nan, math.nan, 0, error.status)
     read = np.isfinite(error.gain)

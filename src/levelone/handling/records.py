@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from levelone.errors import InputError, unknown_name
+from levelone.handling.axes import without_jumps
 from levelone.handling.history import FloatArray, TimeHistory
 
 CHANNEL_UNITS = {
@@ -56,7 +57,8 @@ def record(
 ) -> TimeHistory:
     """One run from plain arrays of shape ``[time]``, SI and rad.
 
-    A channel without a ``trim`` value takes its mean before ``input_on``; one without a unit takes that of its name.
+    A channel without a ``trim`` value takes its mean before ``input_on``; one without a unit takes that of its name. The mean of
+    a heading or bank angle is that without whole turns between samples.
 
     Raises
     ------
@@ -71,7 +73,7 @@ def record(
                 raise unknown_name(group, key, series)
     known = trim or {}
     trims = {
-        key: np.array([float(known[key])]) if key in known else _mean_before(t, values, input_on, key)
+        key: np.array([float(known[key])]) if key in known else _mean_before(t, without_jumps(key, values), input_on, key)
         for key, values in series.items()
     }
     return TimeHistory(

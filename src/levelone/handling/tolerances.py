@@ -7,7 +7,6 @@ its paragraph. A tolerance given as a value and as a percentage is met where the
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -17,13 +16,21 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from levelone.errors import InputError, unknown_name
+from levelone.handling.axes import RATE_AND_ATTITUDE
 from levelone.handling.levels import Confidence
+from levelone.handling.toml_files import read_toml_file, subtable
 
 Verdict = Literal["within", "outside", "undefined", "no tolerance"]
 DEFAULT = "fidelity-tolerances"
 
 _ROUNDING = 1e-12
-_SI = {"deg": ("rad", math.pi / 180.0), "deg/s": ("rad/s", math.pi / 180.0)}
+_DEG = math.pi / 180.0
+_UNITS = {
+    **{unit: (unit, 1.0) for unit in ("1", "s", "1/s", "rad", "rad/s", "m", "m/s")},
+    "deg": ("rad", _DEG),
+    "deg/s": ("rad/s", _DEG),
+}
+"""Units that a tolerance may be stated in: SI unit of the metric, and the factor to it."""
 _KEYS = ("absolute", "relative", "unit", "paragraph", "source", "confidence", "note")
 
 
@@ -34,7 +41,7 @@ class Tolerance:
     Parameters
     ----------
     name
-        Of the metric.
+        Of the metric, behind its axis and a dot where it holds for one only.
     absolute
         SI; NaN where none is stated.
     relative
@@ -82,6 +89,8 @@ def compare_metrics(
     flight: Mapping[str, float],
     simulation: Mapping[str, float],
     tolerances: Mapping[str, Tolerance] | None = None,
+    *,
+    axis: str = "",
 ) -> tuple[MetricRow, ...]:
     """Difference and verdict of every metric, in the order of ``flight``, then of those that only ``simulation`` has.
 
@@ -92,6 +101,8 @@ def compare_metrics(
     tolerances
         By metric; by default those of :func:`load_tolerances`. A metric without one gets its difference and the verdict
         ``"no tolerance"``.
+    axis
+        Of the motion: tolerances of this axis come before those of any.
 
     Notes
     -----
@@ -100,12 +111,20 @@ def compare_metrics(
 
     Examples
     --------
-    >>> [row.verdict for row in compare_metrics({"zeta": 0.35, "omega_bw": 2.0}, {"zeta": 0.36, "omega_bw": 2.1})]
+    >>> rows = compare_metrics({"zeta": 0.35, "omega_bw": 2.0}, {"zeta": 0.36, "omega_bw": 2.1}, axis="roll")
+    >>> [row.verdict for row in rows]
     ['within', 'no tolerance']
     """
     known = load_tolerances() if tolerances is None else tolerances
     names = dict.fromkeys([*flight, *simulation])
-    return tuple(_row(name, flight.get(name, math.nan), simulation.get(name, math.nan), known.get(name)) for name in names)
+    return tuple(
+        _row(name, flight.get(name, math.nan), simulation.get(name, math.nan), tolerance_of(known, name, axis)) for name in names
+    )
+
+
+def tolerance_of(tolerances: Mapping[str, Tolerance], name: str, axis: str = "") -> Tolerance | None:
+    """The tolerance of a metric on an axis, otherwise that of any axis, otherwise None."""
+    return tolerances.get(f"{axis}.{name}", tolerances.get(name))
 
 
 def _row(name: str, flight: float, simulation: float, tolerance: Tolerance | None) -> MetricRow:
@@ -126,18 +145,15 @@ def _row(name: str, flight: float, simulation: float, tolerance: Tolerance | Non
 def load_tolerances(path: str | PathLike[str] | None = None) -> Mapping[str, Tolerance]:
     """Tolerances by metric: those that ship, or the user's from a TOML file of the same form.
 
+    One for a single axis (table ``tolerance.yaw.damped_period``) stands under ``"yaw.damped_period"``.
+
     Raises
     ------
     InputError
-        The file cannot be read, or an entry is missing, unknown or ill-formed.
+        The file cannot be read, or an entry is missing, unknown or ill-formed, its unit not one of SI nor deg or deg/s.
     """
     source = Path(path) if path is not None else resources.files("levelone.handling").joinpath(f"library/{DEFAULT}.toml")
-    try:
-        content = tomllib.loads(source.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(str(source), f"cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(str(source), f"is not a TOML file: {error}") from error
+    content = read_toml_file(source, str(source))
     where = DEFAULT if path is None else str(path)
     known = ("schema", "name", "source", "tolerance")
     for key in content:
@@ -145,25 +161,32 @@ def load_tolerances(path: str | PathLike[str] | None = None) -> Mapping[str, Tol
             raise unknown_name(where, key, known)
     if content.get("schema") != 1:
         raise InputError(f"{where}: schema", f"is {content.get('schema')!r}, must be 1")
-    tables = content.get("tolerance")
-    if not isinstance(tables, dict) or not all(isinstance(table, dict) for table in tables.values()):
-        raise InputError(f"{where}: tolerance", "must hold one table for each metric")
+    if "tolerance" not in content:
+        raise InputError(f"{where}: tolerance", "missing: one table for each metric")
     origin = str(content.get("source", ""))
+    tables: dict[str, Any] = {}
+    for name, table in subtable(content["tolerance"], f"{where}: tolerance").items():
+        if name in RATE_AND_ATTITUDE:
+            tables |= {f"{name}.{metric}": each for metric, each in subtable(table, f"{where}: tolerance.{name}").items()}
+        else:
+            tables[name] = table
     return {name: _tolerance(f"{where}: tolerance.{name}", name, table, origin) for name, table in tables.items()}
 
 
-def _tolerance(where: str, name: str, table: Mapping[str, Any], origin: str) -> Tolerance:
-    for key in table:
+def _tolerance(where: str, name: str, table: Any, origin: str) -> Tolerance:
+    for key in subtable(table, where):
         if key not in _KEYS:
             raise unknown_name(where, key, _KEYS)
     if "unit" not in table:
         raise InputError(f"{where}.unit", "missing")
+    if not isinstance(table["unit"], str) or table["unit"] not in _UNITS:
+        raise unknown_name(f"{where}.unit", str(table["unit"]), _UNITS)
     if table.get("confidence") not in get_args(Confidence):
         raise unknown_name(f"{where}.confidence", str(table.get("confidence")), get_args(Confidence))
     absolute, relative = (_number(f"{where}.{key}", table.get(key)) for key in ("absolute", "relative"))
     if math.isnan(absolute) and math.isnan(relative):
         raise InputError(where, "states neither an absolute nor a relative tolerance")
-    unit, factor = _SI.get(str(table["unit"]), (str(table["unit"]), 1.0))
+    unit, factor = _UNITS[table["unit"]]
     return Tolerance(
         name=name,
         absolute=absolute * factor,

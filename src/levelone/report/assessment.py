@@ -108,10 +108,11 @@ def _swept(shown: Shown) -> list[Plan]:
     chart = None if assessment.sweeping is None else assessment.boundaries.bandwidth.get(assessment.sweeping.task)
     points = [(name, [r for r in each.readings if r.chart.startswith("bandwidth")]) for name, each in shown.sides]
     if chart is not None and _drawable(points):
-        caption = f"Bandwidth and phase delay of attitude, bars of two standard deviations. {tables.chart_words(chart)}"
+        caption = f"Bandwidth and phase delay of attitude, bars of 95 %. {tables.chart_words(chart)}"
         plans.append(Plan("plane_bandwidth", "planes", caption, False, partial(figures.draw_bandwidth_plane, points, chart)))
-    if shown.comparison is not None and shown.comparison.responses:
-        found = [(each.title, each.added) for each in shown.comparison.responses]
+    responses = () if shown.comparison is None else shown.comparison.responses
+    found = [(each.title, each.added) for each in responses if each.added is not None]
+    if found:
         caption = (
             "Simulation over flight between the envelopes of unnoticeable added dynamics (tinted; dash-dotted: unverified, and of "
             "fighters in up-and-away flight)."

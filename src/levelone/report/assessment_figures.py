@@ -130,7 +130,7 @@ def _mark(panel: Axes, history: TimeHistory, channel: str, time: float, text: st
 
 
 def draw_bandwidth_plane(points: Sequence[tuple[str, Sequence[Reading]]], chart: Chart) -> Figure:
-    """Phase delay over bandwidth, with bars of two standard deviations; data in the first colour, reference in the second."""
+    """Phase delay over bandwidth, with bars of 95 %; data in the first colour, reference in the second."""
     figure, panel = _plane()
     drawn = [reading for _, readings in points for reading in readings]
     right = max([2.6, *(1.3 * r.value("omega_bw").value for r in drawn if math.isfinite(r.value("omega_bw").value))])
@@ -144,7 +144,7 @@ def draw_bandwidth_plane(points: Sequence[tuple[str, Sequence[Reading]]], chart:
         for reading, marker in zip(readings, ("D", "s", "o"), strict=False):
             omega, tau = reading.value("omega_bw"), reading.value("tau_p")
             if math.isfinite(omega.value) and math.isfinite(tau.value):
-                errors = (2.0 * each.error if math.isfinite(each.error) else 0.0 for each in (omega, tau))
+                errors = (each.half_width if math.isfinite(each.half_width) else 0.0 for each in (omega, tau))
                 look = {**_POINT, "marker": marker, "markerfacecolor": colour}
                 panel.errorbar([omega.value], [tau.value], *reversed([*errors]), ecolor=style.BLACK, elinewidth=0.7, **look,
                                label=_plain(f"{name}: {reading.title}"))  # fmt: skip

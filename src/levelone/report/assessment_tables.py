@@ -13,6 +13,8 @@ from levelone.campaign.assessment_compare import Comparison, Pair
 from levelone.campaign.assessment_data import Loaded
 from levelone.campaign.assessment_record import level_text
 from levelone.campaign.assessment_tests import Reading, Value
+from levelone.handling import added_dynamics, mismatch
+from levelone.handling.added_dynamics import POINTS
 from levelone.handling.levels import Chart, DampingLimits
 from levelone.report import symbols
 from levelone.report.formatting import UNDEFINED, number, percent
@@ -56,11 +58,11 @@ def reading_rows(assessment: Assessment) -> list[dict[str, Any]]:
 
 
 def value_cell(value: Value) -> dict[str, Any]:
-    """Symbol, number with two standard deviations, and unit of one value."""
+    """Symbol, number with its 95 % interval, and unit of one value."""
     scale, unit = field_unit(value)
     text = number(scale * value.value)
-    if math.isfinite(value.value) and math.isfinite(value.error):
-        text = f"{text} ± {number(2.0 * scale * value.error, 2)}"
+    if math.isfinite(value.value) and math.isfinite(value.half_width):
+        text = f"{text} ± {number(scale * value.half_width, 2)}"
     return {"symbol": symbol(value.name), "text": text, "unit": unit if text != UNDEFINED else ""}
 
 
@@ -94,13 +96,11 @@ def sweep_words(assessment: Assessment) -> dict[str, Any]:
     how = assessment.sweeping
     if how is None:
         return {}
-    shortest = min(float(each.time[-1] - each.time[0]) for each in assessment.histories)
-    windows = how.windows or tuple(part * shortest for part in (0.6, 0.4, 0.2))
     averages = [each.identified.averages for each in assessment.responses.values()]
     least = min((float(each.min()) for each in averages), default=math.nan)
     return {
         "range": f"{number(how.omega_min, 3)} to {number(how.omega_max, 3)} rad/s",
-        "windows": ", ".join(number(each, 3) for each in windows), "averages": number(least, 3),
+        "windows": ", ".join(number(each, 3) for each in how.windows), "averages": number(least, 3),
         "type": how.response_type.replace("_", " "), "task": how.task.replace("_", " "),
         "reference": number(math.degrees(how.phase_reference), 3),
     }  # fmt: skip
@@ -128,8 +128,8 @@ def mapping_rows(loaded: Sequence[Loaded]) -> list[dict[str, str]]:
     """A row for each channel, once for all files that take it from the same column."""
     rows: dict[tuple[str, str, str, str], dict[str, str]] = {}
     for each in loaded:
-        for name, source in each.mapping.items():
-            unit = each.table.units.get(name, "s")
+        for name, source in each.table.sources.items():
+            unit = each.table.units[name]
             factor = f"× {number(source.factor, 6)}" if source.factor != 1.0 else ""
             shift = f" + {number(source.offset, 6)}" if source.offset else ""
             key = (name, source.name, unit, factor + shift)
@@ -143,12 +143,13 @@ def comparison_rows(found: Comparison | None) -> dict[str, Any]:
         return {}
     return {
         "cost": number(found.cost, 3), "verdict": found.verdict, "unpaired": found.unpaired,
+        "sources": [(mismatch.SOURCE, mismatch.CONFIDENCE), (added_dynamics.SOURCE, added_dynamics.CONFIDENCE)],
         "responses": [
             {
                 "title": each.title, "cost": number(each.mismatch.cost, 3), "gain": number(each.mismatch.gain_part, 3),
-                "phase": number(each.mismatch.phase_part, 3), "verdict": each.mismatch.verdict, "share": percent(each.added.share),
-                "noticed": each.added.verdict,
-                "range": f"{number(each.added.error.omega[0], 3)} to {number(each.added.error.omega[-1], 3)}",
+                "phase": number(each.mismatch.phase_part, 3), "verdict": each.mismatch.verdict, "share": percent(each.share),
+                "noticed": each.noticed, "read": f"{each.read} of {POINTS}",
+                "range": "" if each.added is None else " to ".join(number(each.added.error.omega[end], 3) for end in (0, -1)),
             }
             for each in found.responses
         ],
