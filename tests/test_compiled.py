@@ -60,3 +60,14 @@ def test_private_folder_or_none(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
     assert folder_seen_by_a_new_process(blocked) == "None"
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="other systems have no such modes")
+def test_a_folder_that_others_can_write_to_keeps_no_code(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Numba reads its index by pickle: what a stranger puts there would run."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    mine = compiled.cache_folder.__wrapped__(("aerodynamics",))
+    Path(str(mine)).chmod(0o777)
+    assert compiled.cache_folder.__wrapped__(("aerodynamics",)) is None
+    Path(str(mine)).chmod(0o700)
+    assert compiled.cache_folder.__wrapped__(("aerodynamics",)) == mine

@@ -65,11 +65,22 @@ def cache_folder(folders: tuple[str, ...] = GROUPS[0]) -> str | None:
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     folder = Path(base) / "levelone" / digest.hexdigest()
     try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        folder.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        folder.mkdir(exist_ok=True, mode=0o700)
+        if not _own(folder):
+            return None
         with tempfile.TemporaryFile(dir=folder):
             return str(folder)
     except OSError:
         return None
+
+
+def _own(folder: Path) -> bool:
+    """Whether only this user can write to a folder: what Numba keeps is read back as it is."""
+    if not hasattr(os, "getuid"):
+        return True
+    info = folder.stat()
+    return info.st_uid == os.getuid() and not info.st_mode & 0o022
 
 
 def _decorate(options: dict[str, Any]) -> Callable[[Callable[..., Any]], Any]:

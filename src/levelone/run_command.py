@@ -14,8 +14,6 @@ from levelone.errors import InputError
 if TYPE_CHECKING:
     from levelone.config.campaign_table import CampaignOptions
 
-STORE = "campaign.sqlite"
-
 
 def run(
     study: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.")],
@@ -63,7 +61,7 @@ def run_builtin(study: Path, out: Path | None, seed: int | None, threads: int | 
         with stage_bars() as progress:
             results = run_study(checked, folder, seed=seed, threads=threads, progress=progress)
     except KeyboardInterrupt:
-        say(f"interrupted: finished runs are kept in {folder / STORE}, the same command goes on with them")
+        say(f"interrupted: finished runs are kept in {folder}, the same command goes on with them")
         raise typer.Exit(INTERRUPTED) from None
     verdicts = in_one_line(decide(folder)) if checked.findings is not None else ""
     page = render_report(folder, workers=min(threads_of(threads), 4))
@@ -114,6 +112,8 @@ def _options(given: CampaignOptions, executor: str | None, workers: int | None) 
 
         check_executor(executor, "--executor")
         changes |= {"executor": executor} | ({} if executor == "cluster" else {"cluster": None})
+        if executor != "processes" and workers is None:
+            changes |= {"workers": None}
     try:
         return replace(given, **changes)  # type: ignore[arg-type]
     except InputError as error:
@@ -121,5 +121,7 @@ def _options(given: CampaignOptions, executor: str | None, workers: int | None) 
 
 
 def _check_resumable(folder: Path, resume: bool) -> None:
-    if resume and not (folder / STORE).is_file():
-        raise InputError("--resume", f"{folder} holds no {STORE}: there is no campaign to go on with")
+    from levelone.campaign.store_schema import FILE_NAME
+
+    if resume and not (folder / FILE_NAME).is_file():
+        raise InputError("--resume", f"{folder} holds no {FILE_NAME}: there is no campaign to go on with")

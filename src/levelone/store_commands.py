@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -13,43 +12,58 @@ from levelone.console import say, show
 from levelone.errors import InputError
 
 if TYPE_CHECKING:
-    from levelone.campaign.store_reader import Stored
+    from levelone.campaign.store_plan import Plan
+    from levelone.campaign.store_reader import Stored, StoredModel
 
 DirArgument = Annotated[Path, typer.Argument(metavar="DIR", help="The folder of a campaign's results.")]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="The new file: .csv, .parquet or .nc.")]
 ModelOption = Annotated[str, typer.Option("--model", metavar="HASH", help="Beginning of a model's hash, where there are several.")]
 Force = Annotated[bool, typer.Option("--force", help="Write over a file that is there.")]
 
-#: what a run writes beside its store before the first evaluation
-PLAN_NAME = "campaign.json"
-
 
 def status(folder: DirArgument, model: ModelOption = "") -> None:
     """Say what a campaign has done, what failed and where, and how to go on; also while it runs."""
-    from levelone.campaign.store_export import chosen
+    from levelone.campaign.store_plan import read_plan
     from levelone.campaign.store_reader import read_stored, stored_models
     from levelone.campaign.store_schema import is_written, open_to_read
 
     path = store_of(folder)
-    plan = read_plan(folder)
     with closing(open_to_read(path)) as connection:
-        models = stored_models(connection, path)
-        stored = read_stored(connection, path, chosen(models, path, model)) if models else None
+        plan, models = read_plan(connection, path), stored_models(connection, path)
+        shown = _shown(models, path, model, plan)
+        of_plan = plan is not None and (shown is None or shown.hash == plan.model)
+        stored = read_stored(connection, path, shown, planned=of_plan) if shown else None
     running = is_written(path)
-    if plan.get("study"):
-        say(f"study: {plan['study']}")
-    held = len(stored.points) if stored else 0
-    say(_done(held, plan.get("planned")))
-    if stored:
+    if plan and plan.study:
+        say(f"study: {plan.study}")
+    if plan and of_plan:
+        say(_done(len(stored.points) if stored else 0, plan.planned))
+    else:
+        say(f"evaluations: {len(stored.points) if stored else 0} (of all studies)")
+    if stored and len(stored.points):
         _outcomes(stored)
         _time(stored)
-    if len(models) > 1 and stored:
-        others = ", ".join(each.hash[:12] for each in models if each.hash != stored.model.hash)
-        say(f"this is model {stored.model.hash[:12]}; the store also holds evaluations of {others} (--model)")
+    _others(models, shown)
     if running:
         say("a process is running this campaign now")
-    elif held < plan.get("planned", 0):
+    elif plan and plan.held < plan.planned:
         say(f"to go on: levelone run STUDY.toml --out {folder} --resume (runs only what is missing)")
+
+
+def _shown(models: list[StoredModel], path: Path, prefix: str, plan: Plan | None) -> StoredModel | None:
+    """The model that was asked for; else that of the plan, None while it has no evaluations; else the one evaluated last."""
+    from levelone.campaign.store_export import chosen
+
+    if prefix or (plan is None and models):
+        return chosen(models, path, prefix)
+    return next((each for each in models if plan and each.hash == plan.model), None)
+
+
+def _others(models: list[StoredModel], shown: StoredModel | None) -> None:
+    others = ", ".join(each.hash[:12] for each in models if each is not shown)
+    if others:
+        this = f"this is model {shown.hash[:12]}" if shown else "of this model there is none yet"
+        say(f"{this}; the store also holds evaluations of {others} (--model)")
 
 
 def export(folder: DirArgument, file: FileArgument, model: ModelOption = "", force: Force = False) -> None:
@@ -78,36 +92,10 @@ def store_of(folder: Path) -> Path:
     return path
 
 
-def read_plan(folder: Path) -> dict[str, Any]:
-    """``planned`` (number of evaluations) and ``study`` (title) of the last run, as far as the folder says.
-
-    Raises
-    ------
-    InputError
-        The file is damaged.
-    """
-    path = folder / PLAN_NAME
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        if not isinstance(found, dict):
-            raise ValueError("it holds no names")
-        plan = {name: found[name] for name in ("planned", "study") if name in found}
-        if not isinstance(plan.get("planned", 0), int) or not isinstance(plan.get("study", ""), str):
-            raise ValueError("it holds other kinds of values than a number and a title")
-    except FileNotFoundError:
-        return {}
-    except OSError as error:
-        raise InputError(str(path), f"cannot be read: {error.strerror}") from None
-    except (ValueError, TypeError, RecursionError) as error:
-        raise InputError(str(path), f"is damaged ({error}): remove it, the evaluations do not depend on it") from None
-    return plan
-
-
-def _done(held: int, planned: int | None) -> str:
-    if planned is None:
-        return f"evaluations: {held}"
+def _done(held: int, planned: int) -> str:
     text = f"evaluations: {held}, planned: {planned}"
-    return f"{text} ({100.0 * held / planned:.0f} %)" if 0 < held <= planned else text
+    # rounded down: 100 % is all of them
+    return f"{text} ({100 * held // planned} %)" if held else text
 
 
 def _outcomes(stored: Stored) -> None:

@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 
 from levelone.campaign.evaluation_store import EvaluationStore
 from levelone.campaign.models.protocol import Evaluations
+from levelone.campaign.store_plan import Plan, read_plan
 from levelone.campaign.store_reader import outcomes, read_stored, status_name, status_text, stored_models, unanswered
 from levelone.campaign.store_schema import APPLICATION_ID, FORMAT, StoreError, is_written, open_to_read, transaction
 from levelone.errors import InputError, LeveloneError
@@ -149,7 +150,7 @@ class TestLookup:
 
 
 class TestRetry:
-    def test_only_what_got_no_answer_at_all_is_run_again(self, path: Path) -> None:
+    def test_only_what_the_model_did_not_answer_is_run_again(self, path: Path) -> None:
         points, given = answers(10)
         with opened(path) as store:
             store.add(points, given)
@@ -170,6 +171,22 @@ class TestRetry:
             stored = read_stored(connection, path, stored_models(connection, path)[0])
         assert stored.attempts[(stored.points == points[3]).all(axis=1)] == 4 + 2
         assert stored.attempts.sum() == 55 + 2
+
+    def test_an_evaluation_of_which_one_run_timed_out_can_be_mended_as_a_whole(self, path: Path) -> None:
+        points = np.array([[1.0, 2.0, 3.0]])
+        late = Evaluations(
+            np.array([[0.5, np.nan]]), np.array([[0, int(Status.TIMED_OUT)]]), np.array([[1]]), np.array([60.0]), ("late",)
+        )
+        whole = Evaluations(np.array([[0.25, 2.0]]), np.zeros((1, 2), dtype=np.int64), np.array([[2]]), np.array([1.0]), ("",))
+        with opened(path) as store:
+            store.add(points, late)
+            assert not store.lookup(points, retry_failed=True)[0].any()
+            with pytest.raises(ValueError, match="already held"):
+                store.add(points, whole)
+            store.add(points, whole, replace_failed=True)
+            found, back = store.lookup(points, retry_failed=True)
+        assert found.all()
+        assert_same(back, whole)
 
     def test_an_answer_is_never_replaced(self, path: Path) -> None:
         points, given = answers(3)
@@ -197,12 +214,47 @@ class TestRetry:
             assert store.counts() == {}
 
 
+class TestPlan:
+    def planned(self, path: Path) -> Plan | None:
+        with closing(open_to_read(path)) as connection:
+            return read_plan(connection, path)
+
+    def test_counts_what_this_study_needs_whoever_asked_for_it_first(self, path: Path) -> None:
+        points, given = answers(30)
+        with opened(path, study="s1", study_title="first") as store:
+            store.add(points[:20], given.select(slice(0, 20)))
+            store.plan(points[:3])
+        with opened(path, study="s2", study_title="second") as store:
+            store.plan(points[[15, 16, 17, 25, 26, 25]])
+            assert self.planned(path) == Plan(store._model, "second", 5, 3)
+            store.add(points[25:26], given.select(slice(25, 26)))
+        assert self.planned(path).held == 4
+        with closing(open_to_read(path)) as connection:
+            (model,) = stored_models(connection, path)
+            stored = read_stored(connection, path, model, planned=True)
+        assert {tuple(point) for point in stored.points} == {tuple(points[i]) for i in (15, 16, 17, 25)}
+
+    def test_no_study_has_said_what_it_needs(self, path: Path) -> None:
+        with opened(path) as store:
+            store.add(*answers(4))
+            assert self.planned(path) is None
+            store.plan(np.zeros((0, 3)))
+        assert self.planned(path) is None
+
+    def test_a_plan_that_is_refused_leaves_the_earlier_one(self, path: Path) -> None:
+        with opened(path) as store:
+            store.plan(answers(4)[0])
+            with pytest.raises(InputError, match="finite"):
+                store.plan(np.array([[1.0, 2.0, np.nan]]))
+        assert self.planned(path).planned == 4
+
+
 class TestOutcomes:
     def test_the_first_cause_counts(self) -> None:
         crashed, valley, caution = int(Status.CRASHED), int(Status.NO_VALLEY), int(Status.PIO_CAUTION)
         status = np.array([[0, 0], [caution, 0], [valley, crashed], [0, valley], [crashed, crashed]])
         assert outcomes(status).tolist() == [0, 0, crashed, valley, crashed]
-        assert unanswered(status).tolist() == [False, False, False, False, True]
+        assert unanswered(status).tolist() == [False, False, True, False, True]
 
     def test_without_responses_nothing_failed(self) -> None:
         assert outcomes(np.zeros((2, 0), dtype=np.int64)).tolist() == [0, 0]
@@ -389,6 +441,11 @@ class TestRefused:
         self.filled(path)
         self.altered(path, f"PRAGMA user_version = {FORMAT + 1}")
         self.refused(path, f"format {FORMAT + 1}.*newer")
+
+    def test_an_older_format(self, path: Path) -> None:
+        self.filled(path)
+        self.altered(path, f"PRAGMA user_version = {FORMAT - 1}")
+        self.refused(path, f"format {FORMAT - 1}.*another folder")
 
     def test_the_database_of_another_application(self, path: Path) -> None:
         self.altered(path, "CREATE TABLE t (x)")

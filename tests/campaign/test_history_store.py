@@ -166,6 +166,26 @@ class TestDamage:
             store.read(key(1))
         assert len(str(caught.value).splitlines()) == 1
 
+    @pytest.mark.parametrize("damage", [lambda old: old[: len(old) // 2], lambda old: b"no HDF5" * 100])
+    def test_a_damaged_file_does_not_keep_later_ones_from_the_disk(
+        self, store: HistoryStore, damage: Callable[[bytes], bytes], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(history_store, "GATHER", 3)
+        store.add([key(1)], [{"step": record(1)}])
+        path = store.files()[0]
+        path.write_bytes(damage(path.read_bytes()))
+        broken = path.read_bytes()
+        for i in range(2, 8):
+            store.add([key(i)], [{"step": record(i)}])
+        assert path.read_bytes() == broken
+        with pytest.raises(InputError, match=r"00000001\.h5: cannot be read"):
+            store.read(key(7))
+        assert len(list(store.folder.iterdir())) == 7
+        path.rename(store.folder.parent / path.name)
+        again = HistoryStore.for_writing(store.folder)
+        for i in range(2, 8):
+            assert_same(again.read(key(i))["step"], record(i))
+
     def test_a_file_of_other_content_is_named(self, store: HistoryStore) -> None:
         with h5py.File(store.folder / "00000001.h5", "w") as file:
             file.create_group(key(1).hex()).create_group("step")

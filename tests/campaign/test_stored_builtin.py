@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from levelone.campaign import build_model
-from levelone.campaign.stored_builtin import FILE, StoredBuiltin, open_store
+from levelone.campaign.store_schema import FILE_NAME
+from levelone.campaign.stored_builtin import StoredBuiltin, open_store
 from levelone.config.study_file import load_study
 from levelone.uncertainty import latin_hypercube
 
@@ -72,7 +73,7 @@ def test_only_what_is_missing_flies(study, points, tmp_path: Path, monkeypatch: 
         StoredBuiltin(model, store).assess(points[:2], lambda done: None)
         StoredBuiltin(model, store).assess(points[:4], lambda done: None)
     assert flown == [2, 1]  # the fourth point is the second one
-    assert (tmp_path / FILE).is_file()
+    assert (tmp_path / FILE_NAME).is_file()
 
 
 def test_another_manoeuvre_is_another_model(study, points, tmp_path: Path) -> None:

@@ -13,20 +13,32 @@ from levelone.handling.manoeuvres import Manoeuvre
 
 def describe_study(study: Study, seed: int) -> dict[str, Any]:
     """Factors, methods and manoeuvres of a study, as written into its results."""
+    return {
+        **describe_statements(study, seed),
+        "vehicle": study.vehicle.name,
+        "trim_speed": study.quickness.trim_speed,
+        "flight_mode": study.quickness.flight_mode,
+        "manoeuvres": {
+            "attitude_quickness": describe_manoeuvre(study.quickness),
+            "dynamic_stability": describe_manoeuvre(study.stability),
+            "bandwidth": describe_manoeuvre(study.sweep),
+        },
+    }
+
+
+def describe_statements(study: Study | ModelStudy, seed: int) -> dict[str, Any]:
+    """What studies of every model say: purpose, policy, boundaries, factors and sizes."""
     m = study.method
     return {
         "name": study.name,
         "title": study.title,
         "intended_use": study.intended_use,
-        "vehicle": study.vehicle.name,
-        "trim_speed": study.quickness.trim_speed,
-        "flight_mode": study.quickness.flight_mode,
         "policy": study.policy,
         "boundaries": study.boundaries_source,
         "task": study.task,
         "notes": list(study.notes),
         "seed": seed,
-        "factors": [describe_factor(study, j) for j in range(len(study.space.factors))],
+        "factors": [_factor(study, j) for j in range(len(study.space.factors))],
         "correlations": [
             {"factors": [first, second], "rank": rank, "source": why} for first, second, rank, why in study.correlations
         ],
@@ -34,15 +46,10 @@ def describe_study(study: Study, seed: int) -> dict[str, Any]:
             "trajectories": m.trajectories, "levels": m.levels, "samples": m.samples, "base_points": m.base_points,
             "kernel": m.kernel, "trend": m.trend, "bootstrap": m.bootstrap,
         },
-        "manoeuvres": {
-            "attitude_quickness": describe_manoeuvre(study.quickness),
-            "dynamic_stability": describe_manoeuvre(study.stability),
-            "bandwidth": describe_manoeuvre(study.sweep),
-        },
     }  # fmt: skip
 
 
-def describe_factor(study: Study | ModelStudy, j: int) -> dict[str, Any]:
+def _factor(study: Study | ModelStudy, j: int) -> dict[str, Any]:
     """One factor as results.json names it."""
     factor = study.space.factors[j]
     low, high = factor.distribution.support

@@ -17,7 +17,7 @@ from levelone.campaign.models.protocol import Evaluations, FloatArray, IntArray,
 from levelone.campaign.progress import Tally
 from levelone.campaign.store_reader import outcomes, plain_points, status_text, unanswered
 from levelone.campaign.store_schema import StoreError
-from levelone.errors import LeveloneError
+from levelone.errors import InputError, LeveloneError
 from levelone.status import Status
 
 if TYPE_CHECKING:
@@ -84,6 +84,8 @@ def evaluate(
 
     Raises
     ------
+    InputError
+        The model's files have changed since the store was opened: what they answer has no place in it.
     CampaignInterrupted
         Ctrl-C; what had been answered is in the store.
     LeveloneError
@@ -145,7 +147,8 @@ class Ledger:
         records: HistoryStore | None = None,
     ) -> None:
         self.points, self.done = points, 0
-        self._store, self._progress, self._retry_failed, self._records = store, progress, retry_failed, records
+        self._model, self._store, self._records = model, store, records
+        self._progress, self._retry_failed = progress, retry_failed
         self._parts = [none_of(len(model.names), len(model.judged))]
         self._indices: list[IntArray] = [np.empty(0, dtype=np.int64)]
         self._pending: list[tuple[IntArray, Evaluations, int]] = []
@@ -179,6 +182,7 @@ class Ledger:
         answer = joined(with_histories([each[1] for each in self._pending]))
         attempts = np.concatenate([np.full(each[0].size, each[2]) for each in self._pending])
         if self._store is not None:
+            self._check_unchanged()
             if self._records is not None and answer.histories:  # first: an evaluation in the store is not run again
                 self._records.add(self._store.keys(self.points[index]), answer.histories)
             self._store.add(self.points[index], answer, attempts, replace_failed=self._retry_failed)
@@ -191,6 +195,14 @@ class Ledger:
         if ended >= self._next_report or self.done == len(self.points):
             self._next_report = ended + REPORT
             self._report()
+
+    def _check_unchanged(self) -> None:
+        """Refuse to keep answers of files that are not those under whose hash they would be found."""
+        if self._store is not None and not self._store.is_of(self._model.key):
+            raise InputError(
+                "model", "its files have changed since the campaign began; what was answered since the last commit is not kept: "
+                "leave them as they are and repeat the command",
+            )  # fmt: skip
 
     def in_order(self) -> Evaluations:
         """All answers in the order of the points."""

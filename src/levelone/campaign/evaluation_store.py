@@ -1,7 +1,8 @@
 """The store of a campaign: every evaluation on disk as soon as it is counted, found again by what it is an evaluation of.
 
-A row is found by the SHA-256 of the model (all that decides its values) and of the point. Extending a study, changing its analysis
-or resuming it therefore runs only what is missing; another model, or the same with another file, option or library, finds nothing.
+A row is found by the SHA-256 of the model (all that is known to decide its values) and of the point. Changing the analysis of a
+study or resuming it therefore runs only what is missing; another model, or the same with another file, option or library, finds
+nothing.
 Only one process writes; whatever was committed survives a kill, a full disk and a loss of power.
 """
 
@@ -55,6 +56,7 @@ class EvaluationStore:
         self._shape = shape
         self._model_row, self._study_row = rows
         self._exit = ExitStack()
+        self._described: tuple[Sequence[str], ...] = ((), (), (), ())
 
     @classmethod
     def open(
@@ -89,7 +91,7 @@ class EvaluationStore:
         Raises
         ------
         InputError
-            Another process writes the campaign; the file is no store, is damaged or from a newer version.
+            Another process writes the campaign; the file is no store, is damaged or has the format of another version.
         StoreError
             The disk is full.
         """
@@ -105,8 +107,13 @@ class EvaluationStore:
                     _row(connection, "study", "hash, title, first_seen", (study_hash, study_title, now())),
                 )
             store = cls(connection, path, model, (len(factors), len(names), len(judged)), rows)
+            store._described = (names, units, judged, factors)
             store._exit = stack.pop_all()
         return store
+
+    def is_of(self, model_key: Mapping[str, Any]) -> bool:
+        """Whether this is still the model that the store was opened for: its files may have changed meanwhile."""
+        return model_hash(model_key, *self._described) == self._model
 
     def keys(self, points: FloatArray) -> list[bytes]:
         """Content keys of ``points`` [n, k], as :class:`levelone.campaign.history_store.HistoryStore` reads them.
@@ -121,6 +128,23 @@ class EvaluationStore:
             raise InputError("points", f"have shape {shape}; [n, {self._shape[0]}] is needed")
         return content_keys(self._model, points)
 
+    def plan(self, points: FloatArray) -> None:
+        """Note that the study is going to need the evaluations at ``points`` [n, k]; takes the place of an earlier plan.
+
+        For whoever asks how far the campaign is (:func:`levelone.campaign.store_plan.read_plan`); nothing else depends on it.
+
+        Raises
+        ------
+        InputError
+            A point of another size or not finite.
+        StoreError
+            The disk is full or fails; the earlier plan stays.
+        """
+        rows = [(key, self._model_row, self._study_row) for key in sorted(set(self.keys(points)))]
+        with transaction(self._connection, self._path):
+            self._connection.execute("DELETE FROM plan")
+            self._connection.executemany("INSERT INTO plan (key, model, study) VALUES (?, ?, ?)", rows)
+
     def lookup(self, points: FloatArray, *, retry_failed: bool = False) -> tuple[NDArray[np.bool_], Evaluations]:
         """Which of the ``points`` [n, k] are held [n], and what the model answered there, in their order.
 
@@ -129,7 +153,7 @@ class EvaluationStore:
         points
             [n, k]; the same point may come more than once.
         retry_failed
-            Leave out evaluations to which the model gave no answer at all (:func:`unanswered`), so that they are run again.
+            Leave out evaluations of which the model left a response unanswered (:func:`unanswered`), so that they are run again.
 
         Raises
         ------
@@ -158,7 +182,8 @@ class EvaluationStore:
         attempts
             [n] or one number: how often the model was run for each.
         replace_failed
-            A held evaluation without any answer gives way to the new one; its attempts are added.
+            A held evaluation of which a response was left unanswered gives way to the new one, as a whole: an evaluation is never
+            put together from two attempts. The attempts are added.
 
         Raises
         ------

@@ -78,7 +78,7 @@ def failure_map(
     responses
         The m responses.
     seed
-        For the deals, see :func:`levelone.uncertainty.stage_seed`.
+        Of the study; the deals are a stage of their own, see :func:`levelone.uncertainty.stage_seed`.
 
     Returns
     -------

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,7 @@ from levelone.errors import InputError
 from levelone.handling.history import FloatArray, TimeHistory
 
 FOLDER_NAME = "histories"
-#: loose files that become one
+#: loose files that become one; where they cannot, they are tried again when there are as many more
 GATHER = 256
 _PACK, _LOOSE, _PART = ".pack.h5", ".h5", ".part"
 _COMPRESSED: Any = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
@@ -84,8 +85,10 @@ class HistoryStore:
                     _write(file.require_group(key.hex()).create_group(test), history)
         self._where.clear()
         loose = [path for path in self.files() if not path.name.endswith(_PACK)]
-        if len(loose) >= GATHER:
-            self._gather(loose)
+        if loose and len(loose) % GATHER == 0:
+            # what is to be kept is on the disk: no evaluation is to be lost over tidying up, and who reads a damaged file is told
+            with suppress(InputError, StoreError):
+                self._gather(loose)
 
     def read(self, key: bytes) -> dict[str, TimeHistory]:
         """Test to history of one evaluation; empty where none was kept.
@@ -122,7 +125,13 @@ class HistoryStore:
         return where
 
     def _gather(self, loose: Sequence[Path]) -> None:
-        """Copy loose files into one, then remove them; a later history of the same evaluation takes the place of an earlier one."""
+        """Copy loose files into one, then remove them; a later history of the same evaluation takes the place of an earlier one.
+
+        Raises
+        ------
+        InputError, StoreError
+            A file is damaged, or the disk is full; all files are as they were.
+        """
         last = _number(loose[-1])
         with _Draft(self.folder / f"{last:08d}{_PACK}") as packed:
             for path in loose:
@@ -132,7 +141,7 @@ class HistoryStore:
                             if key in packed:
                                 del packed[key]
                             file.copy(file[key], packed, key)
-                except (KeyError, OSError) as error:
+                except _DAMAGED as error:
                     raise _damaged(path, error) from None
         self._remove_loose(last)
 

@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 from levelone._version import __version__
-from levelone.campaign.describe import describe_factor
+from levelone.campaign.describe import describe_statements
 from levelone.campaign.evaluation_store import EvaluationStore
 from levelone.campaign.models.keys import plain
 from levelone.campaign.models.protocol import Model
@@ -30,26 +30,7 @@ _APART = ("kind", "inputs", "outputs", "responses", "fixed", "initial", "set", "
 
 def describe_model_study(study: ModelStudy, seed: int) -> Json:
     """Factors, methods and tests of a study, as written into its results."""
-    m = study.method
-    return {
-        "name": study.name,
-        "title": study.title,
-        "intended_use": study.intended_use,
-        "policy": study.policy,
-        "boundaries": study.boundaries_source,
-        "task": study.task,
-        "notes": list(study.notes),
-        "seed": seed,
-        "factors": [describe_factor(study, j) for j in range(len(study.space.factors))],
-        "correlations": [
-            {"factors": [first, second], "rank": rank, "source": why} for first, second, rank, why in study.correlations
-        ],
-        "method": {
-            "trajectories": m.trajectories, "levels": m.levels, "samples": m.samples, "base_points": m.base_points,
-            "kernel": m.kernel, "trend": m.trend, "bootstrap": m.bootstrap,
-        },
-        "tests": {test.name: plain(test) for test in study.tests},
-    }  # fmt: skip
+    return describe_statements(study, seed) | {"tests": {test.name: plain(test) for test in study.tests}}
 
 
 def describe_model(study: ModelStudy, model: Model) -> Json:
@@ -81,7 +62,7 @@ def _channel(channel: Channel) -> Json:
     trim = "held" if channel.trim is None else channel.trim
     return {
         "levelone": channel.levelone, "name": channel.name, "unit": channel.unit, "scale": channel.scale, "sign": channel.sign,
-        "offset": channel.offset, "trim": trim,
+        "trim": trim,
     }  # fmt: skip
 
 
@@ -89,7 +70,7 @@ def campaign_json(store: EvaluationStore, options: CampaignOptions, evaluated: i
     """How the evaluations came about: ``evaluated`` in this run, ``reused`` from the store, which holds ``outcomes`` in all."""
     return {
         "executor": options.executor,
-        "workers": "one for each core" if options.workers is None else options.workers,
+        "workers": options.workers or ("one for each core" if options.executor == "processes" else "those of the executor"),
         "time_limit": "none" if math.isinf(options.time_limit) else options.time_limit,
         "retries": options.retries,
         "evaluated": evaluated,

@@ -1,12 +1,13 @@
 """A study of a model of one's own from its file to its results folder: nominal case, screening, Monte Carlo, surrogates, indices.
 
 Every evaluation is kept in the folder's store as soon as it has come back, and what the store holds is not run again: a study that
-was interrupted, extended or analysed in another way runs only what is missing.
+was interrupted, or is analysed in another way, runs only what is missing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -18,24 +19,28 @@ from levelone.campaign.evaluate import Tally, evaluate
 from levelone.campaign.evaluation_store import EvaluationStore
 from levelone.campaign.executors import Executor, executor_of
 from levelone.campaign.failure_map import failure_map
-from levelone.campaign.history_store import HistoryStore
+from levelone.campaign.history_store import FOLDER_NAME, HistoryStore
 from levelone.campaign.measures import measures_section
 from levelone.campaign.model_records import write_records
 from levelone.campaign.model_results import campaign_json, describe_model, describe_model_study, model_provenance, nominal_json
 from levelone.campaign.models.build import build
 from levelone.campaign.models.builtin import Assessment
+from levelone.campaign.models.programme import HistoryModel
 from levelone.campaign.models.protocol import Evaluations, FloatArray, Model
 from levelone.campaign.nominal_check import NominalCheck, check_nominal
-from levelone.campaign.sampling import Clock, Progress, Sampled, response_results, sample_study
+from levelone.campaign.sampling import Clock, Progress, Sampled, planned_points, response_results, sample_study
 from levelone.campaign.store import prepare_folder, write_dataset, write_json, write_sample
+from levelone.campaign.store_reader import unanswered
+from levelone.campaign.store_schema import FILE_NAME
 from levelone.campaign.surrogate_errors import residual_dataset, surrogate_errors, with_errors
 from levelone.config.campaign_table import CampaignOptions
 from levelone.config.model_study import ModelStudy
+from levelone.errors import InputError
 from levelone.handling.levels import worst
-from levelone.uncertainty import Responses, latin_hypercube, morris_design, stage_seed
 
 SCHEMA = 1
-STORE, HISTORIES, PLAN = "campaign.sqlite", "histories", "campaign.json"
+#: relative difference up to which two answers at the nominal point are the same
+SAME = 1e-9
 OnTally = Callable[[Tally], None]
 
 
@@ -116,17 +121,19 @@ def run_model_study(
     seed = study.seed if seed is None else seed
     options = options if options is not None else study.campaign
     model, clock = build(replace(study, campaign=options), folder), Clock()
-    _write_plan(folder, study, seed)
-    executor = executor_of(options)
-    with _open(folder, study, model) as store:
-        records = HistoryStore.for_writing(folder / HISTORIES) if options.histories else None
+    with _open(folder, study, model) as store, closing(executor_of(options)) as executor:
+        store.plan(np.vstack([study.nominal, planned_points(study, seed)]))
+        records = HistoryStore.for_writing(folder / FOLDER_NAME) if options.histories else None
         with clock.stage("nominal"):
             progress("nominal case", 0, 1)
             check = check_nominal(study)
+            _agrees_with(store, study.nominal, _answer(check), model.names)
             progress("nominal case", 1, 1)
+        if isinstance(model, HistoryModel):
+            model = replace(model, picks=check.results)
         kept = StoredModel(model, store, executor, on_tally, records, retry_failed)
         names = study.read or model.names
-        sampled = sample_study(study, kept, _nominal(model, check), seed, threads, progress, clock, names)
+        sampled = sample_study(study, kept, assessment_of(model, _answer(check)), seed, threads, progress, clock, names)
         reused = sum(tally.reused for tally in kept.tallies)
         evaluated = sum(tally.done for tally in kept.tallies) - reused
         campaign = campaign_json(store, options, evaluated, reused)
@@ -150,26 +157,42 @@ def assessment_of(model: Model, found: Evaluations) -> Assessment:
 def _open(folder: Path, study: ModelStudy, model: Model) -> EvaluationStore:
     names = study.space.names
     return EvaluationStore.open(
-        folder / STORE, model.key, model.names, model.units, model.judged, names, study.hash, study_title=study.title
+        folder / FILE_NAME, model.key, model.names, model.units, model.judged, names, study.hash, study_title=study.title
     )
 
 
-def _nominal(model: Model, check: NominalCheck) -> Assessment:
-    values = np.array([[each.value for each in check.responses]])
-    status = np.array([[int(each.status) for each in check.responses]])
-    levels = {name: np.array([int(level)]) for name, level in check.levels.items()}
-    return Assessment(Responses(values, status, model.names, model.units), levels, None, {})
+def _answer(check: NominalCheck) -> Evaluations:
+    """The nominal case as an evaluation."""
+    values, status = (np.array([[of(each) for each in check.responses]]) for of in (lambda r: r.value, lambda r: int(r.status)))
+    levels = np.array([[int(level) for level in check.levels.values()]], dtype=np.int64).reshape(1, len(check.levels))
+    return Evaluations(values, status, levels, np.array([check.seconds]), (check.message,))
 
 
-def _write_plan(folder: Path, study: ModelStudy, seed: int) -> None:
-    """How many evaluations the study comes to, for whoever asks how far it is."""
-    method = study.method
-    sample = latin_hypercube(study.space, method.samples, stage_seed(seed, "monte carlo")).runs
-    screening = 0
-    if not study.space.correlated:
-        screening = morris_design(study.space, method.trajectories, method.levels, stage_seed(seed, "morris")).runs
-    plan = {"study": study.title, "hash": study.hash, "seed": seed, "screening": screening, "monte_carlo": sample}
-    write_json(folder / PLAN, plan | {"planned": screening + sample, "study_file": str(study.path)})
+def _agrees_with(store: EvaluationStore, nominal: FloatArray, answer: Evaluations, names: Sequence[str]) -> None:
+    """Keep the nominal case, or hold it against the one that is kept: a model may read files of which its key knows nothing.
+
+    Raises
+    ------
+    InputError
+        The model answers differently than when the store was written.
+    """
+    point = np.atleast_2d(nominal)
+    found, held = store.lookup(point, retry_failed=True)
+    if not found.any():
+        store.add(point, answer, replace_failed=True)
+        return
+    if unanswered(answer.status).any():
+        return
+    other = ~np.isclose(held.values, answer.values, rtol=SAME, atol=0.0, equal_nan=True) | (held.status != answer.status)
+    if other.any():
+        j = int(np.flatnonzero(other[0])[0])
+        now, then = answer.values[0, j], held.values[0, j]
+        raise InputError(
+            "model",
+            f"answers differently at the nominal point than when {FILE_NAME} was written: {names[j]} is {now:.10g} and was "
+            f"{then:.10g}; something that it reads has changed, or it is not deterministic: name another --out, or remove that "
+            "file to evaluate all anew",
+        )
 
 
 def _analysed(
@@ -195,7 +218,7 @@ def _analysed(
         "responses": {name: with_errors(block, errors[name]) for name, block in blocks.items()},
         "measures": measures,
         "levels": {name: analysis.shares_json(codes) for name, codes in sampled.assessed.levels.items()},
-        "failure_map": _failures(sampled, stage_seed(seed, "failure map")),
+        "failure_map": _failures(sampled, seed),
         "assumed": [{"field": name, "why": why} for name, why in study.assumed],
         "not_validated": list(study.not_validated),
         "validity_domain": list(study.validity_domain),
@@ -217,6 +240,8 @@ def criterion_of(study: ModelStudy, model: Model) -> dict[str, str]:
 
 
 def _write_files(folder: Path, sampled: Sampled) -> None:
+    for name in ("morris.nc", "morris.csv"):
+        (folder / name).unlink(missing_ok=True)  # of an earlier run whose factors were not correlated
     if sampled.screening is not None and sampled.screened is not None:
         write_sample(folder, "morris", sampled.screening, sampled.screened)
     write_sample(folder, "monte_carlo", sampled.sample, sampled.assessed)

@@ -85,13 +85,12 @@ def sample_study(
 ) -> Sampled:
     """Screen, sample and decompose; ``names`` are the responses that get surrogates and indices."""
     method = study.method
-    screening = screened = None
-    if not study.space.correlated:
+    screening, sample = designs(study, seed)
+    screened = None
+    if screening is not None:
         with clock.stage("morris"):
-            screening = morris_design(study.space, method.trajectories, method.levels, stage_seed(seed, "morris"))
             screened = _assess(model, screening, "screening (Morris)", progress)
     with clock.stage("monte_carlo"):
-        sample = latin_hypercube(study.space, method.samples, stage_seed(seed, "monte carlo"))
         assessed = _assess(model, sample, "Monte Carlo", progress)
     read = _only(assessed, names)
     with clock.stage("decomposition"):
@@ -101,6 +100,19 @@ def sample_study(
             sample, read, base, study.policy, stage_seed(seed, "surrogates"), method.bootstrap, options, threads, progress
         )
     return Sampled(nominal, screening, screened, sample, assessed, read, found)
+
+
+def designs(study: SampledStudy, seed: int) -> tuple[Design | None, Design]:
+    """The Morris design, None for correlated factors, and the Latin hypercube."""
+    method, screening = study.method, None
+    if not study.space.correlated:
+        screening = morris_design(study.space, method.trajectories, method.levels, stage_seed(seed, "morris"))
+    return screening, latin_hypercube(study.space, method.samples, stage_seed(seed, "monte carlo"))
+
+
+def planned_points(study: SampledStudy, seed: int) -> FloatArray:
+    """[n, factors] all points that a study evaluates, its designs one after the other."""
+    return np.vstack([design.points for design in designs(study, seed) if design is not None])
 
 
 def _assess(model: Assessor, design: Design, stage: str, progress: Progress) -> Assessment:

@@ -140,8 +140,11 @@ def outcomes(status: IntArray) -> IntArray:
 
 
 def unanswered(status: IntArray) -> NDArray[np.bool_]:
-    """Evaluations [n] that gave nothing at all because the model did not answer: those that another attempt may repair."""
-    return np.isin(status, [int(code) for code in NO_ANSWER]).all(axis=1) & (status.shape[1] > 0)
+    """Evaluations [n] of which a response is missing because the model did not answer: those that another attempt may repair.
+
+    One response is enough: where several runs make an evaluation, one of them may have timed out or crashed alone.
+    """
+    return np.isin(status, [int(code) for code in NO_ANSWER]).any(axis=1)
 
 
 def status_text(code: int) -> str:
@@ -233,8 +236,17 @@ def stored_models(connection: sqlite3.Connection, path: Path) -> list[StoredMode
     return models
 
 
-def read_stored(connection: sqlite3.Connection, path: Path, model: StoredModel) -> Stored:
-    """All evaluations of a model, sorted by their points: the order in which they were finished is chance.
+def read_stored(connection: sqlite3.Connection, path: Path, model: StoredModel, *, planned: bool = False) -> Stored:
+    """Evaluations of a model, sorted by their points: the order in which they were finished is chance.
+
+    Parameters
+    ----------
+    connection, path
+        From :func:`levelone.campaign.store_schema.open_to_read`.
+    model
+        One of :func:`stored_models`.
+    planned
+        Only those that the study that ran last needs.
 
     Raises
     ------
@@ -243,8 +255,10 @@ def read_stored(connection: sqlite3.Connection, path: Path, model: StoredModel) 
     """
     query = (
         f"SELECT {COLUMNS}, attempts, finished, coalesce(study.hash, '') "
-        "FROM evaluation LEFT JOIN study ON study.id = evaluation.study WHERE model = ?"
+        "FROM evaluation LEFT JOIN study ON study.id = evaluation.study WHERE evaluation.model = ?"
     )
+    if planned:
+        query += " AND evaluation.key IN (SELECT key FROM plan)"
     with refusing(path):
         rows = connection.execute(query, (model.id,)).fetchall()
     try:

@@ -21,7 +21,7 @@ FILE_NAME = "campaign.sqlite"
 #: "LVL1" in ASCII: the mark of the format in the header of the file
 APPLICATION_ID = 0x4C564C31
 #: raised whenever a table changes
-FORMAT = 1
+FORMAT = 2
 #: s that a commit waits for a reader, and a reader for a commit
 PATIENCE = 60.0
 
@@ -64,6 +64,12 @@ _TABLES = (
     attempts INTEGER NOT NULL,
     finished REAL NOT NULL
 )""",
+    # what the study that ran last is going to need: a key may be here before its evaluation is, or after
+    """CREATE TABLE plan (
+    key BLOB PRIMARY KEY,
+    model INTEGER NOT NULL REFERENCES model (id),
+    study INTEGER NOT NULL REFERENCES study (id)
+) WITHOUT ROWID""",
 )
 
 
@@ -90,7 +96,7 @@ def open_to_write(path: Path) -> sqlite3.Connection:
     Raises
     ------
     InputError
-        The file is no store, is damaged, was written by a newer version, or cannot be opened; it is left as it is.
+        The file is no store, is damaged, has the format of another version, or cannot be opened; it is left as it is.
     """
     with refusing(path):
         connection = connect(path, "rwc")
@@ -256,10 +262,10 @@ def _check(connection: sqlite3.Connection, path: Path) -> None:
     mark, version = (connection.execute(f"PRAGMA {name}").fetchone()[0] for name in ("application_id", "user_version"))
     if mark != APPLICATION_ID:
         raise InputError(str(path), "is a database of another application; it has been left as it is")
-    if version > FORMAT:
+    if version != FORMAT:
+        other = "a newer one" if version > FORMAT else "another folder"
         raise InputError(
-            str(path),
-            f"has format {version}, this version of levelone reads {FORMAT}: use the levelone that wrote it, or a newer one",
+            str(path), f"has format {version}, this version of levelone reads {FORMAT}: use the levelone that wrote it, or {other}"
         )
     if _schema(connection) != _wanted():
         raise InputError(str(path), "holds other tables than a store of a campaign; it has been left as it is")

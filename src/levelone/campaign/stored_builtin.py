@@ -1,4 +1,4 @@
-"""Runs of the built-in vehicle in the store of a campaign: an interrupted or extended study flies only what is missing."""
+"""Runs of the built-in vehicle in a campaign's store: a study interrupted or analysed in another way flies only what is missing."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ import numpy as np
 from levelone._version import __version__
 from levelone.campaign.evaluation_store import EvaluationStore
 from levelone.campaign.models.builtin import CHUNK, CRITERIA, RESPONSES, Assessment, BuiltinModel
-from levelone.campaign.models.keys import plain
+from levelone.campaign.models.keys import plain, value_digest, versions
 from levelone.campaign.models.protocol import Evaluations, FloatArray
 from levelone.campaign.models.sources import sources_digest
+from levelone.campaign.store_schema import FILE_NAME
 from levelone.config.study_file import Study
-from levelone.config.vehicle_file import vehicle_hash
 from levelone.dynamics.integrate import EXTREMES
 from levelone.dynamics.simulate import chunks
 from levelone.status import Status
 from levelone.uncertainty import Responses
 
-FILE = "campaign.sqlite"
 MANOEUVRES = ("attitude_quickness", "dynamic_stability")
 #: a store holds numbers with a status each: the extremes of the manoeuvres stand behind the responses
 KEPT = tuple(f"{manoeuvre} {extreme}" for manoeuvre in MANOEUVRES for extreme in EXTREMES)
@@ -56,21 +55,20 @@ def open_store(folder: Path, study: Study, model: BuiltinModel) -> AbstractConte
     """The store of a study of the built-in vehicle in its results folder."""
     names, units = (*RESPONSES, *KEPT), (*UNITS, *["SI"] * len(KEPT))
     factors = study.space.names
-    return EvaluationStore.open(
-        folder / FILE, _key(study, model), names, units, JUDGED, factors, study.hash, study_title=study.title
-    )
+    return EvaluationStore.open(folder / FILE_NAME, _key(model), names, units, JUDGED, factors, study.hash, study_title=study.title)
 
 
-def _key(study: Study, model: BuiltinModel) -> Mapping[str, Any]:
+def _key(model: BuiltinModel) -> Mapping[str, Any]:
     """All that decides a value; the factors' ranges do not, so that a wider study finds the runs of a narrower one."""
     return {
         "levelone": __version__,
         "sources": sources_digest(),
-        "vehicle": vehicle_hash(study.vehicle_path),
+        "vehicle": value_digest(model.vehicle),
+        "versions": versions("numba", "numpy", "scipy"),
         "targets": list(model.targets),
         "manoeuvres": [plain(model.step), plain(model.pulse)],
-        "omega": plain(model.omega),
-        "boundaries": plain(model.boundaries),
+        "omega": value_digest(model.omega),
+        "boundaries": value_digest(model.boundaries),
         "task": model.task,
         "start": model.start,
     }

@@ -14,7 +14,7 @@ from levelone.campaign.describe import describe_study
 from levelone.campaign.measures import measures_section
 from levelone.campaign.models.builtin import BuiltinModel
 from levelone.campaign.pictures import frequency_groups, history_groups
-from levelone.campaign.sampling import Clock, Progress, Sampled, response_results, sample_study
+from levelone.campaign.sampling import Clock, Progress, Sampled, planned_points, response_results, sample_study
 from levelone.campaign.sections import Sections, run_sections
 from levelone.campaign.store import prepare_folder, write_dataset, write_groups, write_json, write_sample
 from levelone.campaign.stored_builtin import StoredBuiltin, open_store
@@ -84,6 +84,7 @@ def run_study(
         swept = sweep_check(model, study.sweep, study.windows)
         progress("nominal flight", 2, 2)
     with open_store(folder, study, model) as store:
+        store.plan(planned_points(study, seed))
         sampled = sample_study(study, StoredBuiltin(model, store), nominal, seed, threads, progress, clock)
     with clock.stage("errors"):
         errors = surrogate_errors(study, sampled, seed, threads, progress)

@@ -82,11 +82,11 @@ class CampaignOptions:
     executor
         "batch" (in this process), "processes", "dask://HOST:PORT" or "cluster".
     workers
-        Processes; None for one on each core.
+        Of "processes" only; None for one on each core.
     time_limit
         s, one evaluation; infinite where there is none. "batch" cannot end a run and takes none.
     retries
-        How often an evaluation that timed out or crashed is tried again.
+        How often an evaluation is tried again of which the model left a response unanswered, whatever the reason.
     chunk
         Evaluations that travel together; None for the executor's own choice.
     histories
@@ -112,6 +112,8 @@ class CampaignOptions:
         check_executor(self.executor, "executor")
         if self.workers is not None:
             _within("workers", self.workers, 1, MOST_WORKERS)
+            if self.executor != "processes":
+                raise InputError("workers", f'has no place here: it goes with executor = "processes", not with {self.executor!r}')
         if not self.time_limit > 0.0:
             raise InputError("time_limit", f"is {self.time_limit:g} s, must be positive")
         if self.executor == "batch" and math.isfinite(self.time_limit):

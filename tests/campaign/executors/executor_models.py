@@ -90,6 +90,15 @@ class Faulty(Plain):
 
 
 @dataclass(frozen=True)
+class Slow(Plain):
+    """Takes as many seconds as the point's first coordinate says."""
+
+    def evaluate(self, points: np.ndarray) -> Evaluations:
+        time.sleep(points[:, 0].sum())
+        return answers(points)
+
+
+@dataclass(frozen=True)
 class Logged(Plain):
     """Writes a line to a file when it begins and when it ends an evaluation; takes a few milliseconds."""
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import time
 from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,6 +17,7 @@ import pytest
 from executor_models import FAULTS, Faulty, Logged, Plain, answers
 
 from levelone.campaign.evaluate import evaluate
+from levelone.campaign.models.protocol import Evaluations
 from levelone.config.campaign_table import Cluster
 from levelone.errors import InputError, LeveloneError
 from levelone.status import Status
@@ -41,6 +44,12 @@ def cluster() -> Iterator[Any]:
         yield made
 
 
+def carried(model: Plain, points: np.ndarray, *where: Any, progress: Any = lambda tally: None, **options: Any) -> Evaluations:
+    """What the model answers through Dask."""
+    with closing(dask_cluster.DaskExecutor(*where, **options)) as executor:
+        return evaluate(model, points, None, executor, progress)
+
+
 @pytest.fixture
 def address(cluster: Any) -> str:
     return cluster.scheduler_address.removeprefix("tcp://")
@@ -61,7 +70,7 @@ def children() -> list[int]:
 
 
 def test_same_answers_and_no_process_left(cluster: Any, address: str) -> None:
-    found = evaluate(Plain(), POINTS, None, dask_cluster.DaskExecutor(address))
+    found = carried(Plain(), POINTS, address)
     expected = answers(POINTS)
     for name in ("values", "status", "levels", "messages"):
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name))
@@ -84,7 +93,7 @@ def test_a_worker_killed_midway_changes_nothing(cluster: Any, address: str, tmp_
                 killed.append(min(before.values()))
                 os.kill(killed[0], signal.SIGKILL)
 
-        found = evaluate(Logged(log=str(log)), POINTS, None, dask_cluster.DaskExecutor(address, chunk=8), kill_one)
+        found = carried(Logged(log=str(log)), POINTS, address, chunk=8, progress=kill_one)
         until = time.monotonic() + 20.0
         while len(client.scheduler_info()["workers"]) < 2:
             assert time.monotonic() < until
@@ -107,7 +116,7 @@ def test_crashes_and_hangs_do_not_take_a_dask_worker_along(cluster: Any, address
     points[100, 0] = Faulty.HANG
     with distributed.Client(cluster, set_as_default=False) as client:
         before = client.run(os.getpid)
-        found = evaluate(Faulty(), points, None, dask_cluster.DaskExecutor(address, 0.5, opening=1.0))
+        found = carried(Faulty(), points, address, 0.5, opening=1.0)
         assert client.run(os.getpid) == before
     for i, fault in zip((20, 60, 61), faults, strict=True):
         assert found.status[i, 0] == FAULTS[fault][0]
@@ -117,23 +126,44 @@ def test_crashes_and_hangs_do_not_take_a_dask_worker_along(cluster: Any, address
     np.testing.assert_array_equal(found.values[rest], answers(points[rest]).values)
 
 
+def test_all_runs_of_a_campaign_share_one_connection(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    points, events = POINTS[:12].copy(), []
+    points[5, 0] = Faulty.NAN
+
+    @contextmanager
+    def counted(where: str) -> Iterator[Any]:
+        with connect.connected(where) as client:
+            events.append("opened")
+            yield client
+            events.append("closed")
+
+    monkeypatch.setattr(dask_cluster, "connected", counted)
+    with closing(dask_cluster.DaskExecutor(address, retries=1)) as executor:
+        assert events == []
+        for part in (points[:6], points[6:]):
+            found = evaluate(Faulty(), part, None, executor)
+            np.testing.assert_array_equal(found.values[:5], answers(part[:5]).values)
+        assert events == ["opened"]
+    assert events == ["opened", "closed"]
+
+
 def test_a_mistake_of_the_user_comes_back_as_such(address: str) -> None:
     points = POINTS[:30].copy()
     points[25, 0] = Faulty.MISTAKE
     with pytest.raises(InputError, match=r"model\.file: there is none"):
-        evaluate(Faulty(), points, None, dask_cluster.DaskExecutor(address))
+        carried(Faulty(), points, address)
 
 
 def test_workers_of_another_version_are_refused(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dask_cluster, "__version__", "0.0.1")
     with pytest.raises(LeveloneError, match=r"started with levelone 0\.0\.1, and a worker of the cluster has"):
-        evaluate(Plain(), POINTS, None, dask_cluster.DaskExecutor(address))
+        carried(Plain(), POINTS, address)
 
 
 def test_no_scheduler_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connect, "PATIENCE", "0.3s")
     with pytest.raises(InputError, match=r"no Dask scheduler answers at dask://127\.0\.0\.1:9"):
-        evaluate(Plain(), POINTS, None, dask_cluster.DaskExecutor("127.0.0.1:9"))
+        carried(Plain(), POINTS, "127.0.0.1:9")
 
 
 def test_a_cluster_whose_workers_have_all_gone_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -229,6 +259,16 @@ class TestSlurm:
             assert words in job
         assert f"--tls-key {certificates}/worker_key.pem" in job
         assert list((folder / "work").iterdir()) == []
+
+    def test_certificates_that_a_killed_campaign_of_this_machine_left_are_removed(self, folder: Path) -> None:
+        self.script(folder / "sbatch", 'echo "Submitted batch job 7"')
+        host = socket.gethostname()
+        left = [folder / "work" / name for name in (f".levelone-{host}@tmp1", f".levelone-{host}-2@tmp2")]
+        for each in left:
+            each.mkdir()
+            (each / "lock").touch()
+        with connect.connected(self.cluster):
+            assert [each.exists() for each in left] == [False, True]
 
     def test_refused(self, folder: Path) -> None:
         self.script(folder / "sbatch", "echo 'invalid partition' >&2; exit 1")

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import fcntl
+import itertools
 import os
+import resource
+import sys
 import time
 from contextlib import closing
 from pathlib import Path
@@ -11,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from executor_models import FAULTS, Commanding, Faulty, Plain, Unopenable, answers
+from executor_models import FAULTS, Commanding, Faulty, Plain, Slow, Unopenable, answers
 
 from levelone.campaign.evaluate import evaluate
 from levelone.campaign.executors import executor_of
@@ -59,6 +62,24 @@ def test_one_in_a_hundred_crashes_hangs_or_answers_nan(folder: Path) -> None:
     assert (found.status[rest] == Status.OK).all()
     assert (found.seconds[found.status[:, 0] == Status.TIMED_OUT] >= 0.7).all()
     assert list(folder.iterdir()) == []
+
+
+def test_who_answered_in_time_is_not_late_because_the_parent_was_busy(folder: Path) -> None:
+    points = np.array([[0.05, 1.0, 1.0], [0.3, 1.0, 1.0]])
+    statuses = dict[int, int]()
+    with closing(ProcessExecutor(2, time_limit=1.0, opening=0.0).run(Slow(), points)) as pairs:
+        for index, answer in pairs:
+            statuses |= zip(index.tolist(), answer.status[:, 0].tolist(), strict=True)
+            if index.size and len(statuses) == 1:
+                time.sleep(1.3)  # a commit on a slow disk
+    assert statuses == {0: Status.OK, 1: Status.OK}
+
+
+def test_a_late_first_evaluation_is_said_to_be_the_first(folder: Path) -> None:
+    points = np.array([[0.5, 1.0, 1.0], [Faulty.HANG, 1.0, 1.0], [Faulty.HANG, 2.0, 1.0]])
+    found = evaluate(Faulty(), points, None, ProcessExecutor(1, time_limit=0.3, opening=0.2))
+    assert found.status[:, 0].tolist() == [Status.OK, Status.TIMED_OUT, Status.TIMED_OUT]
+    assert ["the first evaluation of its process" in text for text in found.messages] == [False, False, True]
 
 
 def test_message_of_a_crash_holds_the_signal_and_the_output_of_that_evaluation(folder: Path) -> None:
@@ -111,6 +132,45 @@ def test_starts_that_crash_are_not_repeated_for_ever(folder: Path, monkeypatch: 
     assert list(folder.iterdir()) == []
 
 
+def test_more_workers_than_files_can_be_open_end_in_one_line_and_leave_none_open(folder: Path) -> None:
+    before = set(os.listdir("/dev/fd"))
+    free = (number for number in itertools.count() if str(number) not in before)
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (next(itertools.islice(free, 16, None)), hard))
+    try:
+        with pytest.raises(
+            LeveloneError, match=r"worker \d+ of 12 cannot be started: .*Too many open files.*; use fewer --workers"
+        ):
+            evaluate(Plain(), POINTS, None, ProcessExecutor(12))
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+    assert set(os.listdir("/dev/fd")) == before
+    assert list(folder.iterdir()) == []
+
+
+def test_a_process_that_cannot_be_tied_is_not_left_behind(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from levelone.campaign.executors import child
+
+    def refuse(self: object, group: int) -> None:
+        groups.append(group)
+        raise OSError(22, "Invalid argument")
+
+    groups = list[int]()
+    before = set(os.listdir("/dev/fd"))
+    monkeypatch.setattr(child.Tether, "tie", refuse)
+    with pytest.raises(LeveloneError, match="worker 1 of 2 cannot be started"):
+        evaluate(Plain(), POINTS, None, ProcessExecutor(2))
+    with pytest.raises(ProcessLookupError):
+        os.killpg(groups[0], 0)
+    assert set(os.listdir("/dev/fd")) == before
+
+
+def test_no_room_for_temporary_files(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "none"))
+    with pytest.raises(LeveloneError, match="no folder for temporary files can be made in it: No such file"):
+        evaluate(Plain(), POINTS, None, ProcessExecutor(1))
+
+
 def test_a_model_that_cannot_travel_is_refused() -> None:
     class Local(Plain):
         pass
@@ -153,6 +213,19 @@ def test_folders_of_killed_runs_are_removed_and_those_of_others_are_not(folder: 
     assert list(folder.iterdir()) == []
 
 
+def test_a_disk_without_locks_costs_nothing_but_the_tidying(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(descriptor: int, operation: int) -> None:
+        raise OSError(38, "Function not implemented")
+
+    left = folder / f"{PREFIX}left"
+    left.mkdir()
+    (left / "lock").touch()
+    monkeypatch.setattr(fcntl, "flock", refuse)
+    with scratch() as mine:
+        assert mine.exists()
+    assert list(folder.iterdir()) == [left]
+
+
 class TestExecutorOf:
     """The executor that the options name."""
 
@@ -161,6 +234,12 @@ class TestExecutorOf:
     def test_processes(self) -> None:
         assert executor_of(CampaignOptions("processes", **self.options)) == ProcessExecutor(3, 2.0, 1)
         assert executor_of(CampaignOptions("processes", chunk=5)) == ProcessExecutor(chunk=5)
+
+    @pytest.mark.parametrize("executor", ["processes", "dask://node7:8786"])
+    def test_none_of_them_on_windows(self, executor: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(sys, "platform", "win32")
+        with pytest.raises(InputError, match="needs Linux or macOS"):
+            executor_of(CampaignOptions(executor))
 
     def test_batch(self) -> None:
         assert executor_of(CampaignOptions(retries=2)) == BatchExecutor(retries=2)

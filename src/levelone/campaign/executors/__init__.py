@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Executor(Protocol):
-    """Anything that carries points to a model and brings back its answers."""
+    """Anything that carries points to a model and brings back its answers; to be closed when a campaign has no more to run."""
 
     @property
     def retries(self) -> int:
@@ -28,13 +28,16 @@ class Executor(Protocol):
         """Indices into ``points`` [n, factors] and the answers there, each index once, in the order in which they are finished.
 
         A pair may be empty: it says that nothing more is at hand, and that what was given should be committed now. To close the
-        generator stops everything that it started.
+        generator stops every evaluation.
 
         Raises
         ------
         LeveloneError
             The model cannot be opened, or the workers cannot be reached.
         """
+
+    def close(self) -> None:
+        """End what is kept from one :meth:`run` to the next, as a cluster that was started."""
 
 
 def executor_of(options: CampaignOptions) -> Executor:
@@ -45,13 +48,13 @@ def executor_of(options: CampaignOptions) -> Executor:
     InputError
         It does not exist on this platform, or needs a package that is not installed.
     """
+    if options.executor != "batch" and sys.platform == "win32":
+        raise InputError("executor", f"{options.executor!r} needs Linux or macOS; on Windows use its Subsystem for Linux")
     if options.executor == "batch":
         from levelone.campaign.executors.batch import BatchExecutor
 
         return BatchExecutor(**_chunk(options), retries=options.retries)
     if options.executor == "processes":
-        if sys.platform == "win32":
-            raise InputError("executor", "'processes' needs Linux or macOS; use 'batch', or a Dask cluster that runs there")
         from levelone.campaign.executors.processes import ProcessExecutor
 
         return ProcessExecutor(options.workers, options.time_limit, options.retries, **_chunk(options))

@@ -49,3 +49,6 @@ class BatchExecutor:
             yield np.empty(0, dtype=np.int64), answer.select(slice(0))
             size = min(self.chunk, int(2 * size if 2 * took < CALL else max(1, size * CALL / took)))
             first = last
+
+    def close(self) -> None:
+        """Nothing is kept."""

@@ -21,9 +21,11 @@ from levelone.campaign.models.protocol import TAIL, FloatArray
 from levelone.campaign.tether import Tether
 
 #: one thread for each library that would start one for each core: there is one worker for each core
-ONE_THREAD = {
-    f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "BLIS", "VECLIB_MAXIMUM", "NUMEXPR", "NUMBA")
-} | {"VECLIB_MAXIMUM_THREADS": "1"}
+ONE_THREAD = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "NUMBA")} | {
+    "VECLIB_MAXIMUM_THREADS": "1"
+}
+#: said of a late evaluation, so that a model whose every process is late at its first is not taken for one that hangs
+FIRST = " (the first evaluation of its process, and the opening of the model with it: a longer time limit may be all it needs)"
 #: s, a message that stops halfway for as long as this comes from a process that is no more
 STALLED = 30
 #: s, how long a process may take to end once its channel is closed, and to write where it hangs
@@ -52,6 +54,11 @@ class Child:
         Indices of the points that it holds; it is at work on the first.
     since
         When it began that (or its start), s of the monotonic clock.
+
+    Raises
+    ------
+    OSError
+        The process cannot be started; nothing of it is left but its folder.
     """
 
     def __init__(self, folder: Path, pickled: bytes) -> None:
@@ -61,25 +68,32 @@ class Child:
         self._given = 0.0, 1
         (folder / "tmp").mkdir(parents=True)
         ours, theirs = socket.socketpair()
-        self._tether = Tether()
-        with theirs, (folder / "output").open("ab") as output:
-            command = [sys.executable, "-P", "-u", str(worker.__file__), str(theirs.fileno()), str(self._tether.far)]
-            self.process = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=output,
-                pass_fds=(theirs.fileno(), self._tether.far),
-                start_new_session=True,
-                env={**os.environ, **ONE_THREAD, "TMPDIR": str(folder / "tmp")},
-            )
-        self._tether.tie(self.process.pid)
-        limit = struct.pack("ll", STALLED, 0)
-        for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
-            ours.setsockopt(socket.SOL_SOCKET, option, limit)
+        with contextlib.ExitStack() as undo, theirs:
+            undo.callback(ours.close)
+            self._tether = Tether()
+            undo.callback(self._tether.release)
+            self.process = self._started(theirs.fileno())
+            undo.callback(self._kill)
+            self._tether.tie(self.process.pid)
+            limit = struct.pack("ll", STALLED, 0)
+            for option in (socket.SO_RCVTIMEO, socket.SO_SNDTIMEO):
+                ours.setsockopt(socket.SOL_SOCKET, option, limit)
+            undo.pop_all()
         self.channel = Connection(ours.detach())
         self.since = time.monotonic()
         self._send((sys.path, pickled))
+
+    def _started(self, channel: int) -> subprocess.Popen[bytes]:
+        with (self.folder / "output").open("ab") as output:
+            return subprocess.Popen(
+                [sys.executable, "-P", "-u", str(worker.__file__), str(channel), str(self._tether.far)],
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=output,
+                pass_fds=(channel, self._tether.far),
+                start_new_session=True,
+                env={**os.environ, **ONE_THREAD, "TMPDIR": str(self.folder / "tmp")},
+            )
 
     def assign(self, indices: list[int], points: FloatArray) -> None:
         """Hand over ``points`` [n, factors], known to the parent by ``indices`` [n]."""
@@ -125,6 +139,8 @@ class Child:
                 self.process.wait(ENDING)
         code = self._kill()
         how = f"ended after {waited:.3g} s without an answer" if overdue else f"the process ended {_cause(code)}"
+        if overdue and self.ready and not self.answered:
+            how += FIRST
         said = self._output(TAIL - len(how) - 20)
         shutil.rmtree(self.folder, ignore_errors=True)
         return f"{how}; its last output: {said}" if said else how

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
+import socket
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from levelone.campaign.executors.scratch import scratch
 from levelone.config.campaign_table import Cluster
 from levelone.errors import InputError
 
@@ -81,15 +82,15 @@ def _slurm(cluster: Cluster) -> Iterator[SpecCluster]:
     options: dict[str, Any] = {"queue": cluster.queue, "account": cluster.account, "walltime": cluster.walltime}
     # the jobs read the certificates: in a folder that all machines of a cluster see
     with (
-        TemporaryDirectory(prefix=".levelone-", dir=Path.cwd()) as folder,
+        scratch(Path.cwd(), f".levelone-{socket.gethostname()}@") as folder,
         SLURMCluster(
             n_workers=cluster.workers,
             cores=cluster.cores,
             processes=1,
             memory=cluster.memory,
             protocol="tls://",
-            security=_written(_certificates(), Path(folder)),
-            shared_temp_directory=folder,
+            security=_written(_certificates(), folder),
+            shared_temp_directory=str(folder),
             scheduler_options=NO_PAGES,
             **{name: value for name, value in options.items() if value is not None},
         ) as made,

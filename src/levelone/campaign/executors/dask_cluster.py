@@ -10,7 +10,8 @@ import uuid
 from collections import deque
 from collections.abc import Generator, Iterator
 from concurrent.futures import CancelledError
-from dataclasses import dataclass
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,9 +43,29 @@ ALIVE = ("running", "connecting")
 LOST = "the Dask scheduler cannot be reached any more; what came back is kept: start one and repeat the command with --resume"
 
 
+class _Connection:
+    """The client of a cluster, made when it is first asked for."""
+
+    def __init__(self) -> None:
+        self._kept = ExitStack()
+        self._client: Client | None = None
+
+    def client(self, where: str | Cluster) -> Client:
+        if self._client is None:
+            self._client = self._kept.enter_context(connected(where))
+        return self._client
+
+    def close(self) -> None:
+        self._client = None
+        self._kept.close()
+
+
 @dataclass(frozen=True)
 class DaskExecutor:
     """The workers of a Dask cluster; each thread of a worker keeps one process in which the model runs.
+
+    A cluster is reached or started by the first run and serves all others, so that a queueing system is asked once for its jobs;
+    it ends with :meth:`close`.
 
     Parameters
     ----------
@@ -63,17 +84,21 @@ class DaskExecutor:
     retries: int = 0
     chunk: int = LARGEST
     opening: float = 60.0
+    _connection: _Connection = field(default_factory=_Connection, init=False, repr=False, compare=False)
 
     def run(self, model: Model, points: FloatArray) -> Generator[tuple[IntArray, Evaluations], None, None]:
         """Indices and answers, chunk by chunk; see :class:`levelone.campaign.executors.Executor`."""
         shape = len(model.names), len(model.judged)
         job = Job(__version__, uuid.uuid4().hex, pickled_model(model), *shape, self.time_limit, self.opening)
-        with connected(self.where) as client:
-            tasks = _Tasks(client, job, points, self.chunk)
-            try:
-                yield from tasks.run()
-            finally:
-                tasks.close()
+        tasks = _Tasks(self._connection.client(self.where), job, points, self.chunk)
+        try:
+            yield from tasks.run()
+        finally:
+            tasks.close()
+
+    def close(self) -> None:
+        """Leave the scheduler, and end the cluster where it was started here."""
+        self._connection.close()
 
 
 class _Tasks:

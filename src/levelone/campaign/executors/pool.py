@@ -60,7 +60,8 @@ class Pool:
     InputError
         From :meth:`run`: the model cannot be opened, or met a mistake of its user.
     LeveloneError
-        From :meth:`run`: three workers in a row ended before they had opened the model.
+        There is no room for a folder of temporary files. From :meth:`run`: a worker cannot be started, or three in a row ended
+        before they had opened the model.
     """
 
     def __init__(
@@ -100,7 +101,8 @@ class Pool:
             ready = wait([child.channel for child in self._children], TICK)
             for child in [each for each in self._children if each.channel in ready]:
                 yield from self._read(child, todo)
-            for child in [each for each in self._children if time.monotonic() > self._due(each)]:
+            # what has been answered is not late, however long ago: this process may have been busy since
+            for child in [each for each in self._children if time.monotonic() > self._due(each) and not each.channel.poll()]:
                 yield from self._lost(child, todo, Status.TIMED_OUT)
             yield np.empty(0, dtype=np.int64), none_of(*self._shape)
 
@@ -115,9 +117,16 @@ class Pool:
                 child.assign(indices, points[indices])
         starting = sum(not child.ready for child in self._children)
         while len(self._children) < self._workers and starting < len(todo):
-            self._children.append(Child(self._folder / f"{self._started}", self._pickled))
-            self._started += 1
+            self._start()
             starting += 1
+
+    def _start(self) -> None:
+        number = len(self._children) + 1
+        try:
+            self._children.append(Child(self._folder / f"{self._started}", self._pickled))
+        except OSError as error:
+            raise LeveloneError(f"worker {number} of {self._workers} cannot be started: {error}; use fewer --workers") from None
+        self._started += 1
 
     def _read(self, child: Child, todo: deque[int]) -> Iterator[tuple[IntArray, Evaluations]]:
         """All that a worker has sent: at most what it was given."""

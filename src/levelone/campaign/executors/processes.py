@@ -40,3 +40,6 @@ class ProcessExecutor:
         shape = len(model.names), len(model.judged)
         with Pool(pickled_model(model), *shape, self.workers or cores(), self.time_limit, self.opening) as pool:
             yield from pool.run(points, self.chunk)
+
+    def close(self) -> None:
+        """Nothing is kept: the processes of a run end with it."""

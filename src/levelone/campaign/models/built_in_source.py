@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -11,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levelone.campaign.models.builtin import outside_validity
-from levelone.campaign.models.keys import plain, versions
+from levelone.campaign.models.keys import plain, value_digest, versions
 from levelone.campaign.models.protocol import FloatArray, ModelFailure
 from levelone.config.manoeuvres import integration_step
 from levelone.dynamics import linearize, simulate
@@ -56,10 +54,9 @@ class BuiltInSource:
     def key(self) -> Mapping[str, Any]:
         """The vehicle's numbers, the condition, and the versions of what compiles the simulation."""
         table = self.table
-        numbers = json.dumps(plain(table.vehicle), sort_keys=True).encode()
         return {
             "kind": table.kind,
-            "vehicle": hashlib.sha256(numbers).hexdigest(),
+            "vehicle": value_digest(table.vehicle),
             "trim_speed": table.trim_speed,
             "flight_mode": table.flight_mode,
             "start": table.start,

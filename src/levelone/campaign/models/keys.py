@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass
@@ -45,6 +46,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, bool | int | str):
         return value
     raise TypeError(f"{type(value).__name__} has no place in a key")
+
+
+def value_digest(value: Any) -> str:
+    """SHA-256 of a value as plain JSON, in hexadecimal: for what is too large to stand in a key as it is."""
+    return hashlib.sha256(json.dumps(plain(value), sort_keys=True).encode()).hexdigest()
 
 
 def file_digest(path: Path, field: str) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 
 from levelone._version import __version__
-from levelone.campaign.models.keys import plain
+from levelone.campaign.models.keys import plain, versions
 from levelone.campaign.models.protocol import (
     TAIL,
     Evaluations,
@@ -69,11 +69,14 @@ class HistoryModel:
         Level boundaries.
     keep_histories
         Whether records travel back with the responses.
+    picks
+        What the tests that pick extrema read at the nominal point, by test, where it is known already: a campaign flies it
+        once, and no process again.
 
     Notes
     -----
-    The nominal point is flown when an evaluation first needs its peaks, once in each process, and does not travel. Where it fails
-    no value is flagged as read from another peak.
+    Where ``picks`` are not given, the nominal point is flown when an evaluation first needs its peaks. Where it fails no value is
+    flagged as read from another peak.
     """
 
     source: HistorySource
@@ -82,6 +85,7 @@ class HistoryModel:
     nominal: tuple[float, ...]
     boundaries: Boundaries
     keep_histories: bool = False
+    picks: Mapping[str, Result] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         return {each.name: getattr(self, each.name) for each in fields(self)}
@@ -107,6 +111,7 @@ class HistoryModel:
         return {
             "levelone": __version__,
             "sources": sources_digest(),
+            "versions": versions("numba", "numpy", "scipy"),
             "source": self.source.key,
             "tests": plain(self.tests),
             "factors": plain(self.factors),
@@ -118,6 +123,8 @@ class HistoryModel:
     def reference(self) -> Mapping[str, Result]:
         """What the tests that pick extrema read at the nominal point, by test; those that fail there are left out."""
         picking = tuple(test for test in self.tests if test.criterion in PICKING)
+        if self.picks is not None:
+            return {test.name: self.picks[test.name] for test in picking if test.name in self.picks}
         results = self._results(np.array(self.nominal, dtype=np.float64), picking)[0]
         return {name: result for name, result in results.items() if not isinstance(result, ModelFailure)}
 
