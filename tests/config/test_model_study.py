@@ -13,7 +13,6 @@ from levelone.config.campaign_table import CampaignOptions, Cluster
 from levelone.config.model_schema import SECTIONS, CampaignSection, ClusterTable, TestTable
 from levelone.config.model_study import is_model_study, load_model_study
 from levelone.config.model_table import (
-    KINDS,
     BuiltInTable,
     CommandTable,
     FmuTable,
@@ -156,7 +155,6 @@ def test_every_kind_becomes_its_description(of_kind, tmp_path):
     assert (jsbsim.initial, jsbsim.set, jsbsim.folder) == ((("ic/h-sl-ft", 100.0),), (("a/b", 1.5),), None)
     linear = load_model_study(of_kind('kind = "state-space"\nfile = "craft.toml"')).model
     assert isinstance(linear, StateSpaceTable)
-    assert set(KINDS) == set(SECTIONS)
 
 
 def test_a_built_in_vehicle_goes_through_the_same_door(of_kind):
@@ -316,6 +314,25 @@ def test_a_missing_file_is_answered_with_the_closest_name(of_kind, tmp_path):
     assert "did you mean 'vehicle_v2.fmu'?" in error.problem
 
 
+@pytest.mark.parametrize(
+    ("section", "channels", "field", "words"),
+    [
+        ('kind = "fmu"\nfile = "craft.fmu"\ntolerance = 1e-6', None, "model.tolerance", 'mode = "co-simulation"'),
+        (
+            'kind = "state-space"\nfile = "craft.fmu"',
+            ('unit = "1"', 'unit = "1"\ntrim = 0.5'),
+            "model.inputs.delta_lon.trim",
+            "changes from trim only",
+        ),
+    ],
+)
+def test_keys_that_would_have_no_effect(of_kind, tmp_path, section, channels, field, words):
+    (tmp_path / "craft.fmu").touch()
+    error = refused(of_kind(section, channels=CHANNELS if channels is None else CHANNELS.replace(*channels, 1)))
+    assert error.field == f"study.toml: {field}"
+    assert words in error.problem
+
+
 def test_records_are_whole_steps_of_the_model(of_kind, tmp_path):
     (tmp_path / "craft.fmu").touch()
     error = refused(of_kind('kind = "fmu"\nfile = "craft.fmu"\nstep = 0.003'))
@@ -332,6 +349,9 @@ def test_records_are_whole_steps_of_the_model(of_kind, tmp_path):
         ('executor = "dask://127.0.0.1:65536"', "executor", "between 1 and 65535"),
         ('executor = "dask://a;rm -rf x:80"', "executor", "not an address"),
         ('executor = "processes"\nworkers = 0', "workers", "between 1 and 10000"),
+        ("workers = 2", "workers", "has no place here"),
+        ('executor = "dask://127.0.0.1:8786"\nworkers = 2', "workers", "has no place here"),
+        ('executor = "cluster"\nworkers = 2\n[campaign.cluster]\nkind = "local"\nworkers = 2', "workers", "has no place here"),
         ('executor = "processes"\ntime_limit = 0.0', "time_limit", "must be positive"),
         ("time_limit = 5.0", "time_limit", "batch"),
         ("retries = 1000", "retries", "between 0 and 100"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from levelone.campaign.executors import executor_of
 from levelone.campaign.models.build import build
 from levelone.campaign.models.programme import HistoryModel
 from levelone.campaign.models.protocol import Evaluations, LinearSource, Model, ModelFailure
-from levelone.campaign.models.readings import Result, integrated, read, read_response
+from levelone.campaign.models.readings import Result, read, read_linear
 from levelone.campaign.nominal_reading_rules import reading_findings
 from levelone.campaign.nominal_rules import Finding, record_findings
 from levelone.config.model_table import BuiltInTable, StateSpaceTable, Test, response_names
@@ -148,20 +148,14 @@ def _results(study: ModelStudy, model: Model, histories: Mapping[str, TimeHistor
     found: dict[str, Result] = {}
     for test in study.tests:
         try:
-            if test.method == "linear":
-                found[test.name] = _linear(study, model, test)
+            if test.method == "linear" and isinstance(model, HistoryModel):
+                source = cast(LinearSource, model.source)  # only such sources take the method
+                found[test.name] = read_linear(test, source, study.nominal, study.boundaries)
             elif test.name in histories:
                 found[test.name] = read(test, histories[test.name], study.boundaries)
         except ModelFailure:  # the evaluation has it as a status
             continue
     return found
-
-
-def _linear(study: ModelStudy, model: Model, test: Test) -> Result:
-    assert isinstance(model, HistoryModel)
-    source: LinearSource = model.source  # type: ignore[assignment]  # only such sources take the method
-    response = source.frequency_response(study.nominal, test.manoeuvre.axis, str(test.output), np.array(test.omega))
-    return read_response(test, integrated(test, response.scaled(float(test.sign))), study.boundaries)
 
 
 def _responses(model: Model, answer: Evaluations) -> tuple[Response, ...]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from levelone.campaign.models.readings import channels_of
 from levelone.config.model_table import Test
 from levelone.handling.axes import RATE_AND_ATTITUDE
 from levelone.handling.history import FloatArray, TimeHistory
@@ -78,15 +79,6 @@ def record_findings(test: Test, history: TimeHistory) -> list[Finding]:
     ]
 
 
-def channels_read(test: Test) -> tuple[str, ...]:
-    """Channels that the criterion reads."""
-    if test.criterion == "bandwidth":
-        return (str(test.output),)
-    if test.criterion == "translational_rate":
-        return (test.manoeuvre.axis,)
-    return RATE_AND_ATTITUDE[str(test.axis)]
-
-
 def _change(history: TimeHistory, name: str) -> FloatArray:
     return np.asarray(history.change(name)[0])
 
@@ -102,7 +94,7 @@ def _seen(history: TimeHistory, name: str) -> bool:
 
 
 def _unseen(test: Test, history: TimeHistory) -> Iterator[Finding]:
-    for name in channels_read(test):
+    for name in channels_of(test):
         if not _seen(history, name):
             largest = float(np.abs(_change(history, name)[_after(history)]).max())
             yield Finding(
@@ -220,7 +212,7 @@ def _first_half_cycle(test: Test) -> float:
 
 def _drift(test: Test, history: TimeHistory) -> Iterator[Finding]:
     before = ~_after(history)
-    for name in channels_read(test):
+    for name in channels_of(test):
         if not before.any() or not _seen(history, name):
             continue
         change = _change(history, name)
@@ -239,7 +231,7 @@ def _flat(test: Test, history: TimeHistory) -> Iterator[Finding]:
     if test.manoeuvre.shape != "sweep":
         return
     moving = (history.time >= test.manoeuvre.on) & (history.time <= test.manoeuvre.off)
-    for name in channels_read(test):
+    for name in channels_of(test):
         change = _change(history, name)[moving]
         size = float(np.ptp(change))
         if not _seen(history, name):

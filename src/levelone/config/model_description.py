@@ -86,8 +86,13 @@ def description_of(section: Strict, folder: Path, responses: Sequence[ResponseNa
     if isinstance(section, schema.PythonSection | schema.CommandSection):
         return _answering(section, folder, tuple(responses), common)
     if isinstance(section, schema.FmuSection):
+        if section.tolerance is not None and section.mode == "co-simulation":
+            raise InputError("model.tolerance", 'has no place here: mode = "co-simulation" integrates with a tolerance of its own')
         return FmuTable(**common, **_plain(section, "mode", "step", "settle", "tolerance"), file=_file(folder, section.file))
     if isinstance(section, schema.StateSpaceSection):
+        for name, table in section.inputs.items():
+            if table.trim != "hold":
+                raise InputError(f"model.inputs.{name}.trim", "has no place here: a linear model knows changes from trim only")
         return StateSpaceTable(**common, file=_file(folder, section.file))
     assert isinstance(section, schema.JsbsimSection)
     return JsbsimTable(

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from levelone.errors import InputError
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -24,7 +26,7 @@ Numbers = tuple[tuple[str, float], ...]
 
 @dataclass(frozen=True)
 class Channel:
-    """Where one command or one channel lies in the model: SI value = ``sign * scale * (value in the model) + offset``.
+    """Where one command or one channel lies in the model: SI value = ``sign * scale * (value in the model)``.
 
     Parameters
     ----------
@@ -40,8 +42,6 @@ class Channel:
     trim
         Of an input, the model's unit: the value that the command is added to; None: the value that the model has when the input
         begins. None for an output.
-    offset
-        SI value of the model's zero.
     """
 
     levelone: str
@@ -50,7 +50,6 @@ class Channel:
     scale: float
     sign: int
     trim: float | None = None
-    offset: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -199,7 +198,7 @@ class FmuTable(Description):
     """A functional mock-up unit.
 
     ``step`` is the communication step in s, None for that of the manoeuvre; ``settle`` are s at the inputs of trim before the
-    record begins; ``tolerance`` is the relative tolerance of a model exchange, None for the unit's own or the solver's.
+    record begins; ``tolerance`` is the relative tolerance of a model exchange, None for 1e-8.
     """
 
     file: Path
@@ -248,7 +247,12 @@ class StateSpaceTable(Description):
     file: Path
 
 
-ATTITUDES = {"pitch": "theta", "roll": "phi", "yaw": "psi"}
+def whole_steps(dt: float, step: float, field: str) -> int:
+    """Steps of a model in a sampling interval, both s; InputError at ``field`` where they are no whole number."""
+    steps = round(dt / step)
+    if steps < 1 or abs(steps * step - dt) > 1e-6 * dt:
+        raise InputError(field, f"a sampling interval of {dt:g} s is no whole number of steps of the model, {step:g} s each")
+    return steps
 
 
 def quantities(test: Test) -> dict[str, str]:
@@ -257,7 +261,9 @@ def quantities(test: Test) -> dict[str, str]:
     The coherence is the least between ``omega_min`` and 2 omega_180, which only a sweep has.
     """
     if test.criterion == "attitude_quickness":
-        angle = f"delta_{ATTITUDES[test.axis or 'pitch']}"
+        from levelone.handling.axes import RATE_AND_ATTITUDE  # not every process that reads a description needs the criteria
+
+        angle = f"delta_{RATE_AND_ATTITUDE[test.axis or 'pitch'][1]}"
         return {"quickness": "1/s", f"{angle}_min": "rad", f"{angle}_pk": "rad"}
     if test.criterion == "dynamic_stability":
         return {"zeta": "1", "omega_n": "rad/s"}
@@ -278,11 +284,3 @@ def response_names(tests: Sequence[Test]) -> tuple[tuple[str, str, str], ...]:
 
 
 ModelDescription = BuiltInTable | PythonTable | CommandTable | FmuTable | JsbsimTable | StateSpaceTable
-KINDS: dict[str, type[Description]] = {
-    "built-in": BuiltInTable,
-    "python": PythonTable,
-    "command": CommandTable,
-    "fmu": FmuTable,
-    "jsbsim": JsbsimTable,
-    "state-space": StateSpaceTable,
-}

@@ -12,7 +12,7 @@ import numpy as np
 
 from levelone.config.manoeuvres import integration_step
 from levelone.config.model_schema import TestTable
-from levelone.config.model_table import BuiltInTable, Description, FmuTable, JsbsimTable, Test, response_names
+from levelone.config.model_table import BuiltInTable, Description, FmuTable, JsbsimTable, Test, response_names, whole_steps
 from levelone.config.quantities import plain
 from levelone.errors import InputError, unknown_name
 from levelone.handling.axes import RATE_AND_ATTITUDE
@@ -47,6 +47,11 @@ _CRITERION_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "translational_rate": ((), ()),
 }
 _ALWAYS = ("name", "criterion", "command", "shape")
+RESERVED = (
+    "assumptions", "campaign", "certainty", "failure_map", "failures", "levels", "model", "provenance", "responses", "summary",
+    "values", "worst",
+)  # fmt: skip
+"""Names of sections of the report, and of the Level over all tests."""
 _POINTS = 400
 RATES = ("p", "q", "r", "yaw_rate")
 """Outputs of a bandwidth that ``integrate`` turns into the response of an attitude."""
@@ -83,6 +88,10 @@ def tests_of(tables: Sequence[TestTable], model: Description, task: str) -> tupl
         of too many samples, names that would give two responses one name.
     """
     for i, table in enumerate(tables):
+        if table.name in RESERVED:
+            raise InputError(
+                f"test.{table.name}.name", f"is a name of the report's own, as are {', '.join(RESERVED)}; choose another"
+            )
         if table.name in [other.name for other in tables[:i]]:
             raise InputError(f"test.{table.name}", "is the name of two tests; each needs one of its own")
     tests = tuple(_test(_entry(table, model), task) for table in tables)
@@ -228,8 +237,8 @@ def _sampling(entry: _Entry) -> float:
         return own if own is not None else USUAL_DT
     if not dt > 0.0:
         raise InputError(f"{entry.path}.dt", f"is {dt:g} s, must be positive")
-    if own is not None and (dt < 0.5 * own or abs(dt / own - round(dt / own)) > 1e-6):
-        raise InputError(f"{entry.path}.dt", f"is {dt:g} s, must be a whole number of steps of the model, {own:g} s each")
+    if own is not None:
+        whole_steps(dt, own, f"{entry.path}.dt")
     return dt
 
 

@@ -23,7 +23,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize, signal
 
 from levelone.errors import InputError
 from levelone.handling.axes import STEADY, first_sample, run_failures
@@ -149,7 +148,9 @@ def first_order(source: FloatArray, time_constant: float, delay: float, dt: floa
     shift = math.floor(delay / dt)
     rest = (shift + 1) * dt - delay  # from the sample before the delayed time to that time
     decay = math.exp(-dt / time_constant)
-    at_samples = np.concatenate([[0.0], signal.lfilter([1.0 - decay], [1.0, -decay], source)[:-1]])
+    from scipy.signal import lfilter  # here and not above: it takes a second that other criteria need not wait for
+
+    at_samples = np.concatenate([[0.0], lfilter([1.0 - decay], [1.0, -decay], source)[:-1]])
     between = source + (at_samples - source) * math.exp(-rest / time_constant)
     answer = np.zeros(source.size)
     answer[shift + 1 :] = between[: max(source.size - shift - 1, 0)]
@@ -201,7 +202,9 @@ def _fit(climb: FloatArray, source: FloatArray, dt: float, window: float) -> tup
     grid = [np.array([x, y]) for x in np.linspace(low[0], high[0], 17) for y in np.linspace(0.0, 0.2 * window, 9)]
     start = min(grid, key=lambda point: float(np.sum(remainder(point) ** 2)))
     inner = np.clip(start, np.array(low) + 1e-6, np.array(high) - 1e-6)
-    found = optimize.least_squares(remainder, inner, bounds=(low, high), x_scale=(1.0, 0.1), xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    from scipy.optimize import least_squares
+
+    found = least_squares(remainder, inner, bounds=(low, high), x_scale=(1.0, 0.1), xtol=1e-12, ftol=1e-12, gtol=1e-12)
     gain, shape = gain_and_shape(found.x)
     spread = float(np.sum((climb - climb.mean()) ** 2))
     r2 = float(np.sum((gain * shape - climb.mean()) ** 2)) / spread if spread > 0.0 else math.nan

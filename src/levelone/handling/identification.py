@@ -23,16 +23,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy import fft, signal
+from scipy import fft
 
 from levelone.errors import InputError, unknown_name
 from levelone.handling.axes import continuous, run_failures
 from levelone.handling.frequency import ComplexArray, FrequencyResponse
 from levelone.handling.history import FloatArray, TimeHistory
+from levelone.handling.tapers import TAPERS, taper_of
 
 WINDOWS = (0.6, 0.4, 0.2)
 """Window lengths taken by default, as parts of the record."""
-TAPERS = ("hann", "hamming", "blackman", "nuttall", "cosine", "boxcar")
 Spectra = tuple[FloatArray, FloatArray, ComplexArray]
 """Auto spectra of input and output and cross spectrum, summed over the segments of one window length."""
 
@@ -175,7 +175,8 @@ def _spectra(x: FloatArray, y: FloatArray, plan: Segmentation, count: int) -> Sp
     shared = min(round(plan.overlap * count), count - 1)
     step = count - shared
     segments = (x.size + 2 * count - shared) // step
-    window = signal.ShortTimeFFT(signal.get_window(plan.taper, count), step, plan.rate, scale_to="psd").win
+    shape = taper_of(plan.taper, count)
+    window = shape / np.sqrt(plan.rate * np.sum(shape**2))  # so that squares are power spectral densities
     source, answer = (
         fft.rfft(sliding_window_view(np.pad(series, count), count)[::step] * window, n=plan.transform)[:, : plan.kept.stop].T.copy()
         for series in (x, y)

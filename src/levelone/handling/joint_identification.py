@@ -28,7 +28,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import signal, special
+from scipy import special
 
 from levelone.errors import InputError
 from levelone.handling.axes import run_failures
@@ -43,6 +43,7 @@ from levelone.handling.identification import (
     record_spectra,
     segmentation,
 )
+from levelone.handling.tapers import taper_of
 from levelone.status import Status
 
 SAME_DT = 1e-4
@@ -204,7 +205,7 @@ def _shared(one: int, other: int, taper: str) -> float:
 
 
 def _correlation(length: float, taper: str) -> FloatArray:
-    window = signal.get_window(taper, max(round(length), 8))
+    window = taper_of(taper, max(round(length), 8))
     product = np.asarray(np.convolve(window, window[::-1]), dtype=np.float64)
     return product / product.max()
 

@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MultipleLocator, NullLocator
 from numpy.typing import NDArray
 
-from levelone.campaign.models.readings import Result, Spectral
-from levelone.campaign.nominal_rules import channels_read
+from levelone.campaign.models.readings import Result, Spectral, channels_of
 from levelone.config.model_table import Test
 from levelone.handling.damping import DynamicStability
 from levelone.handling.history import TimeHistory
@@ -38,7 +37,7 @@ _STABILITY = ((0, "first peak"), (0, "first valley"), (0, "second peak"))
 
 def draw_record(test: Test, history: TimeHistory, result: Result | None) -> Figure:
     """Command and channels below each other, from the first sample to the last, with the picked points."""
-    names = channels_read(test)
+    names = channels_of(test)
     rows = 1 + len(names)
     figure, axes = style.sheet(
         style.PAGE,

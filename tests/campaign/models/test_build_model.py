@@ -43,8 +43,11 @@ OWN = (Path(__file__).parents[3] / "studies" / "own-model" / "study.toml").read_
 
 
 def study(folder: Path, model: str, rest: str, target: str = ""):
-    """The example's study with another model; its factors are omega, zeta and delay."""
+    """The example's study with another model; its factors are omega, zeta and delay, behind a height in metres for a ``target``."""
     head, tail = OWN[: OWN.index("[model]")], OWN[OWN.index("[[factor]]") : OWN.index("[responses]")]
+    if target:
+        height = 'name = "height"\nvalue = 30.0\nunit = "m"\nrange = [-1.0, 1.0]\nkind = "absolute"\nassumed = "example"'
+        tail = f'[[factor]]\n{height}\ntarget = "{target}"\n{tail}'
     path = folder / "study.toml"
     path.write_text(f"{head}\n[model]\n{model}\n{rest}\n{tail}", encoding="utf-8")
     return load_model_study(path)
@@ -99,6 +102,15 @@ def test_what_is_missing_is_said_before_the_first_evaluation(tmp_path, model, re
     (tmp_path / "answering.py").write_text("def answers(p):\n    return {}\n")
     with pytest.raises(InputError, match=problem):
         build(study(tmp_path, model, rest))
+
+
+def test_a_factor_in_another_unit_than_its_property(tmp_path):
+    pytest.importorskip("jsbsim", reason="JSBSim flies the aircraft: pip install levelone[jsbsim]")
+    mapped = FLOWN.replace('"stick"', '"fcs/elevator-cmd-norm"').replace('"theta"\nunit', '"attitude/theta-rad"\nunit')
+    mapped = mapped.replace('"q"\nunit', '"velocities/q-rad_sec"\nunit')
+    loaded = study(tmp_path, 'kind = "jsbsim"\naircraft = "F450"\nstep = 0.004', mapped, "ic/h-sl-ft")
+    with pytest.raises(InputError, match=r"factor\.unit: is 'm', but the name of property 'ic/h-sl-ft' says 'ft'"):
+        build(loaded)
 
 
 def test_kinds_are_imported_when_they_are_asked_for():

@@ -6,6 +6,7 @@ import json
 import os
 import pickle
 import re
+import shutil
 import stat
 import subprocess
 import sys
@@ -21,7 +22,7 @@ from simple_models import FREE, QUICK, SecondOrder, command_table
 
 from levelone.campaign.dakota.parameters import read_parameters
 from levelone.campaign.models.command import CommandHistories, CommandResponses
-from levelone.campaign.models.command_files import dakota_parameters, dakota_results, json_history, json_responses
+from levelone.campaign.models.command_files import dakota_parameters, dakota_results, json_history, json_parameters, json_responses
 from levelone.campaign.models.programme import HistoryModel
 from levelone.campaign.models.protocol import ModelFailure
 from levelone.config.model_table import Channel
@@ -248,6 +249,27 @@ def test_links_that_lead_out_of_the_template_are_refused(tmp_path, target):
         shell(tmp_path, ANSWER, folder=template)
 
 
+@pytest.mark.parametrize("linked", [False, True])
+def test_results_that_lie_in_the_template_are_no_answer(tmp_path, linked):
+    """Of a command that ends well and writes nothing; what a link of those names leads to is not overwritten either."""
+    template = tmp_path / "template"
+    template.mkdir()
+    (template / "old").write_text('{"responses": {"zeta": 1.234, "omega_n": 5}}')
+    for name in ("results.out", "parameters.in", "output.txt"):
+        (template / name).symlink_to("old") if linked else shutil.copy(template / "old", template / name)
+    answer = shell(tmp_path, "exit 0", folder=template).evaluate(POINTS[:1])
+    assert (answer.status == Status.OUTPUT_MISSING).all()
+    assert answer.messages[0].endswith("the command left no file results.out")
+    answer = shell(tmp_path, 'echo said; cat old > "$2"', folder=template).evaluate(POINTS[:1])
+    assert answer.values.tolist() == [[1.234, 5.0]]
+
+
+def test_a_program_is_told_what_is_commanded_and_nothing_else(tmp_path):
+    """No trim speed: it is no number of this model's study."""
+    told = json.loads(json_parameters("key", {}, QUICK.manoeuvre, INPUTS[0]))["manoeuvre"]
+    assert sorted(told) == ["amplitude", "command", "dt", "duration", "on", "shape"]
+
+
 def test_directories_of_failures_are_kept_beside_each_other(tmp_path):
     out = tmp_path / "results"
     model = shell(tmp_path, "echo said; exit 1", keep_in=out)
@@ -306,6 +328,15 @@ def test_key_follows_the_files(tmp_path):
     first = key()
     assert key() == first
     assert len({json.dumps(each) for each in (first, key("2"), key(script_text="true"), key(data_text="2"))}) == 4
+    (template / "link").symlink_to("gain")
+    linked = key()
+    (template / "other").write_text("1")
+    (template / "gain").chmod(0o755)
+    executable = key()
+    (template / "link").unlink()
+    (template / "link").symlink_to("other")
+    assert len({json.dumps(each) for each in (first, linked, executable, key())}) == 4
+    assert key()["template"]["links"] == {"link": "other"}
 
 
 def test_a_model_travels(tmp_path):
@@ -377,6 +408,7 @@ def test_dakotas_format_holds_no_histories(tmp_path):
         ('{"file": "twice.csv"}', Status.MODEL_FAILED, "must name its columns once each"),
         ('{"time": [0, 1]}', Status.MODEL_FAILED, 'neither "time" with "channels"'),
         ('{"time": [0, 1], "channels": {"q": ["a", "b"]}}', Status.MODEL_FAILED, "channel q holds something that is no number"),
+        ('{"time": [0, 1], "channels": {"q": [0, true]}}', Status.MODEL_FAILED, "channel q holds something that is no number"),
         ('{"time": [0, 1], "channels": {"q": [[0], [0, 1]]}}', Status.MODEL_FAILED, "channel q holds something that is no number"),
     ],
 )

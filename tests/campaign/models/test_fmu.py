@@ -28,7 +28,7 @@ from scipy.signal import cont2discrete
 
 from levelone.campaign.models.fmu import FmuSource
 from levelone.campaign.models.fmu_archive import described
-from levelone.campaign.models.fmu_variables import check_variables
+from levelone.campaign.models.fmu_variables import check_start_units, check_variables
 from levelone.campaign.models.protocol import ModelFailure
 from levelone.config.model_table import Channel
 from levelone.errors import InputError
@@ -275,9 +275,45 @@ def test_units_that_are_declared_by_name_only(tmp_path: Path, unit: str, fits: b
             FmuSource(table(file, outputs=(Channel("q", "q", "rad/s", 1.0, 1),)), ())
 
 
+@pytest.mark.parametrize(
+    ("declared", "base", "unit", "fits"),
+    [
+        ("1/s", '<BaseUnit s="-1"/>', "1/s", True),
+        ("1/s", '<BaseUnit s="-1"/>', "Hz", True),
+        ("1/s", '<BaseUnit s="-1"/>', "rad/s", True),  # radians may be left out
+        ("1/s", '<BaseUnit s="-1"/>', "deg/s", False),
+        ("1/s", '<BaseUnit s="-1"/>', "m", False),
+        ("deg", '<BaseUnit rad="1" factor="0.017453292519943295"/>', "rad", False),
+        ("deg", '<BaseUnit rad="1" factor="0.017453292519943295"/>', "deg", True),
+        ("grade", '<BaseUnit rad="1" factor="0.017453292519943295"/>', "deg", True),
+        ("kN", '<BaseUnit kg="1" m="1" s="-2" factor="1000"/>', "kN", True),
+        ("kN", '<BaseUnit kg="1" m="1" s="-2" factor="1000"/>', "N", False),
+        ("kN", "", "N", False),
+        ("V", '<BaseUnit kg="1" m="2" s="-3" A="-1"/>', "notches", True),  # unknown here: the study's word stands
+        ("clicks", "", "m", True),
+    ],
+)
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_the_unit_of_a_factor_is_that_of_its_start_value(
+    tmp_path: Path, version: str, declared: str, base: str, unit: str, fits: bool
+) -> None:
+    place = "binaries/linux64" if version == "2.0" else "binaries/x86_64-linux"
+    xml = description(version).replace("<UnitDefinitions>", f'<UnitDefinitions><Unit name="{declared}">{base}</Unit>')
+    head, name, tail = xml.partition('name="rate_gain"')
+    xml = head + name + tail.replace("start=", f'unit="{declared}" start=', 1)
+    file = archive(tmp_path / "a.fmu", {"modelDescription.xml": xml, f"{place}/pitch.so": b"never loaded"})
+    found = described(file, "co-simulation")
+    assert FmuSource(table(file), ("rate_gain",)).targets == ("rate_gain",)
+    if fits:
+        check_start_units(("rate_gain", "limit"), (unit, "m"), found)
+    else:
+        with pytest.raises(InputError, match=f"factor.unit: is '{unit}', but the FMU declares '{declared}' for 'rate_gain'"):
+            check_start_units(("rate_gain",), (unit,), found)
+
+
 def test_a_step_that_does_not_divide_the_interval() -> None:
     source = FmuSource(table(built("2.0"), step=0.003), ())
-    with pytest.raises(InputError, match=r"model\.step: 0\.003 s of the FMU does not divide the sampling interval of 0\.01 s"):
+    with pytest.raises(InputError, match=r"model\.step: a sampling interval of 0\.01 s is no whole number of steps"):
         source.fly(NONE, STEP)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ import pytest
 
 from levelone.campaign.models.build import build
 from levelone.campaign.models.jsbsim import JsbsimSource
+from levelone.campaign.models.jsbsim_properties import check_factor_units
 from levelone.campaign.models.protocol import ModelFailure
 from levelone.config.model_study import load_model_study
 from levelone.config.model_table import Channel, JsbsimTable
@@ -140,8 +142,12 @@ def test_the_ground_ends_a_flight_and_not_a_stand(body: JsbsimTable) -> None:
     with pytest.raises(ModelFailure, match=r"touches the ground at t = 1\.[0-9]") as caught:
         JsbsimSource(low, ()).fly(NONE, STEP)
     assert caught.value.status is Status.DIVERGED
+    with pytest.raises(ModelFailure, match=r"touches the ground while it settles, after 1\.[0-9]+ s: begin higher") as caught:
+        JsbsimSource(_change(low, settle=4.0), ()).fly(NONE, STEP)
+    assert caught.value.status is Status.DIVERGED
     standing = _change(body, initial=(("ic/h-agl-ft", 0.5),), set=(("body/power", 0.0),))
     assert JsbsimSource(standing, ()).fly(NONE, STEP).time.size == 201
+    assert JsbsimSource(_change(standing, settle=1.0), ()).fly(NONE, STEP).time.size == 201
 
 
 def test_numbers_that_are_not_finite(body: JsbsimTable) -> None:
@@ -177,13 +183,41 @@ def test_numbers_that_are_not_finite(body: JsbsimTable) -> None:
         (
             {"outputs": (Channel("theta", "velocities/u-fps", "rad", 1.0, 1),)},
             (),
-            "model.outputs.theta.unit: unit 'rad' does not fit",
+            "model.outputs.theta.unit: is 'rad', but the name of property 'velocities/u-fps' says 'ft/s'",
         ),
     ],
 )
 def test_what_does_not_fit_the_aircraft(body: JsbsimTable, options: dict[str, Any], targets: tuple[str, ...], words: str) -> None:
     with pytest.raises(InputError, match=words):
         JsbsimSource(_change(body, **options), targets)
+
+
+@pytest.mark.parametrize(
+    ("target", "unit", "own"),
+    [
+        ("ic/h-sl-ft", "m", "'ft'"),
+        ("ic/psi-true-deg", "rad", "'deg'"),
+        ("velocities/u-fps", "kt", "'ft/s'"),
+        ("inertia/pointmass-weight-lbs[1]", "kg", "'lbf' or 'lb'"),
+        ("fcs/elevator-cmd-norm", "%", "'1'"),
+    ],
+)
+def test_the_unit_of_a_factor_is_that_of_its_property(target: str, unit: str, own: str) -> None:
+    with pytest.raises(InputError, match=re.escape(f"factor.unit: is '{unit}', but the name of property '{target}' says {own}")):
+        check_factor_units(("body/power", target), ("whatever", unit))
+
+
+def test_units_of_factors_that_a_property_does_not_contradict() -> None:
+    """A text that is no unit here says nothing against the name."""
+    targets = (
+        "body/power",
+        "ic/h-sl-ft",
+        "inertia/pointmass-weight-lbs",
+        "inertia/pointmass-weight-lbs[1]",
+        "ic/vc-kts",
+        "ic/h-agl-ft",
+    )
+    check_factor_units(targets, ("lbf ft", "ft", "lbf", "lb", "knot", "feet above the pad"))
 
 
 def test_an_aircraft_that_cannot_be_read(body: JsbsimTable) -> None:
@@ -195,7 +229,7 @@ def test_an_aircraft_that_cannot_be_read(body: JsbsimTable) -> None:
 
 def test_a_step_that_does_not_divide_the_interval(body: JsbsimTable) -> None:
     source = JsbsimSource(_change(body, step=0.003), ())
-    with pytest.raises(InputError, match=r"model\.step: 0\.003 s of JSBSim does not divide the sampling interval of 0\.01 s"):
+    with pytest.raises(InputError, match=r"model\.step: a sampling interval of 0\.01 s is no whole number of steps"):
         source.fly(NONE, STEP)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import pickle
 import sys
 from dataclasses import replace
@@ -129,6 +130,9 @@ def test_every_failure_is_data_with_words(module):
         ("{'zeta': True, 'omega_n': 1.0}", "response zeta is True"),
         ("{'zeta': 1j, 'omega_n': 1.0}", "response zeta is 1j"),
         ("{'zeta': None, 'omega_n': 1.0}", "response zeta is None"),
+        ("{'zeta': __import__('numpy').complex128(0.5 + 2j), 'omega_n': 1.0}", "response zeta is np.complex128(0.5+2j)"),
+        ("{'zeta': __import__('numpy').True_, 'omega_n': 1.0}", "response zeta is np.True_"),
+        ("{'zeta': 10**400, 'omega_n': 1.0}", "response zeta is 1000"),
     ],
 )
 def test_answers_that_are_no_numbers(module, returned, words):
@@ -161,6 +165,27 @@ def test_a_vectorised_function_is_called_once_for_many_points(module):
     )
     model.evaluate(POINTS)
     assert sys.modules["own_model"].SIZES == [3]
+
+
+MASKED = """
+import numpy as np
+def answer(p):
+    return {"zeta": np.ma.array(p["a"], mask=p["a"] < 0.0), "omega_n": p["b"]}
+def turning(p):
+    return {"zeta": p["a"] + 1j, "omega_n": p["b"]}
+"""
+
+
+def test_masked_numbers_are_not_finite_and_complex_ones_no_numbers(module):
+    folder = module(MASKED)
+    model = responses(folder, vectorised=True)
+    answer = model.evaluate(POINTS)
+    assert answer.status[:, 0].tolist() == [0, 0, Status.OUTPUT_NOT_FINITE]
+    for i, point in enumerate(POINTS):
+        same(model.evaluate(point), answer.select([i]))
+    complex_ones = responses(folder, "own_model:turning", vectorised=True).evaluate(POINTS)
+    assert (complex_ones.status == Status.MODEL_FAILED).all()
+    assert "zeta is np.complex128(0.2+1j), and a number is needed" in complex_ones.messages[0]
 
 
 def test_wrong_lengths_of_a_vectorised_answer(module):
@@ -213,6 +238,67 @@ def test_two_folders_with_a_module_of_one_name(module):
     one = responses(module("def answer(p):\n    return {'zeta': 1.0, 'omega_n': 1.0}\n", folder="one"))
     two = responses(module("def answer(p):\n    return {'zeta': 2.0, 'omega_n': 1.0}\n", folder="two"))
     assert [each.evaluate(POINTS[:1]).values[0, 0] for each in (one, two, one)] == [1.0, 2.0, 1.0]
+
+
+def test_two_folders_with_helpers_of_one_name(module):
+    for folder, gain in (("one", 1.0), ("two", 2.0)):
+        module(f"GAIN = {gain}\n", "helper", folder)
+        module("import helper\ndef answer(p):\n    return {'zeta': helper.GAIN, 'omega_n': 1.0}\n", folder=folder)
+    models = [responses(module("", "unused", folder)) for folder in ("one", "two", "one")]
+    assert [each.evaluate(POINTS[:1]).values[0, 0] for each in models] == [1.0, 2.0, 1.0]
+
+
+def test_a_helper_left_by_another_study_is_not_taken(module):
+    module("GAIN = 1.0\n", "left_helper", "one")
+    one = module("import left_helper\ndef answer(p):\n    return {'zeta': left_helper.GAIN, 'omega_n': 1.0}\n", folder="one")
+    two = module("import left_helper\ndef answer(p):\n    return {'zeta': left_helper.GAIN, 'omega_n': 1.0}\n", folder="two")
+    assert responses(one).evaluate(POINTS[:1]).values[0, 0] == 1.0
+    with pytest.raises(InputError, match="needs 'left_helper', which is not installed"):
+        responses(two).evaluate(POINTS[:1])
+
+
+@pytest.mark.parametrize("edited", ["own_model", "helper", "own_package.part"])
+def test_edited_code_answers_under_its_new_key(module, edited):
+    """The sources keep their length and, most likely, their second: bytecode of before the edit must not be found either."""
+    texts = {
+        "own_model": "def answer(p):\n    import helper, own_package.part\n    return "
+        "{{'zeta': {} * helper.GAIN * own_package.part.GAIN, 'omega_n': 1.0}}\n",
+        "helper": "GAIN = {}\n",
+        "own_package.part": "GAIN = {}\n",
+    }
+
+    def written(name: str, gain: float):
+        package, _, part = name.rpartition(".")
+        return module(texts[name].format(gain), part, package or ".")
+
+    folder = [written(name, 1.0) for name in ("own_package.part", "helper", "own_model")][-1]
+    module("import helper, own_package.part\n" + (folder / "own_model.py").read_text(), "own_model")
+    before = responses(folder)
+    assert before.evaluate(POINTS[:1]).values[0, 0] == 1.0
+    loaded = sys.modules["own_model"]
+    assert responses(folder).function.__globals__ is vars(loaded)  # unchanged code is not imported again
+    key = before.key
+    text = (folder / f"{edited.replace('.', '/')}.py").read_text().replace("1.0 *", "3.0 *").replace("GAIN = 1.0", "GAIN = 3.0")
+    (folder / f"{edited.replace('.', '/')}.py").write_text(text)
+    after = responses(folder)
+    assert after.key != key
+    assert after.evaluate(POINTS[:1]).values[0, 0] == 3.0
+
+
+def test_an_edited_module_on_the_path_is_imported_anew(module, monkeypatch):
+    monkeypatch.syspath_prepend(str(module("def answer(p):\n    return {'zeta': 1.0, 'omega_n': 1.0}\n", "on_path")))
+    assert responses(None, "on_path:answer").evaluate(POINTS[:1]).values[0, 0] == 1.0
+    module("def answer(p):\n    return {'zeta': 22.0, 'omega_n': 1.0}\n", "on_path")
+    assert responses(None, "on_path:answer").evaluate(POINTS[:1]).values[0, 0] == 22.0
+
+
+def test_a_module_that_the_user_imported_before_an_edit_is_imported_anew(module, monkeypatch):
+    folder = module("def answer(p):\n    return {'zeta': 1.0, 'omega_n': 1.0}\n", "by_hand")
+    monkeypatch.syspath_prepend(str(folder))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+    importlib.import_module("by_hand")
+    module("def answer(p):\n    return {'zeta': 2.0, 'omega_n': 1.0}\n", "by_hand")
+    assert responses(folder, "by_hand:answer").evaluate(POINTS[:1]).values[0, 0] == 2.0
 
 
 def test_key_follows_the_code(module):
@@ -268,6 +354,9 @@ def test_histories_in_the_functions_own_units_and_signs(module):
         ("{'time': t, 'pitch_deg': t}", Status.OUTPUT_MISSING, "returned no 'Q'; it returned time, pitch_deg"),
         ("{'pitch_deg': t, 'Q': t}", Status.OUTPUT_MISSING, "returned no 'time'"),
         ("{'time': t, 'pitch_deg': t, 'Q': ['a'] * t.size}", Status.MODEL_FAILED, "channel Q holds something that is no number"),
+        ("{'time': t, 'pitch_deg': t, 'Q': t + 0j}", Status.MODEL_FAILED, "channel Q holds something that is no number"),
+        ("{'time': t, 'pitch_deg': t, 'Q': t > 1.0}", Status.MODEL_FAILED, "channel Q holds something that is no number"),
+        ("{'time': t + 0j, 'pitch_deg': t, 'Q': t}", Status.MODEL_FAILED, "channel time holds something that is no number"),
         ("{'time': t, 'pitch_deg': t, 'Q': t[:-1]}", Status.MODEL_FAILED, "channel q has"),
         ("{'time': t + 2.0, 'pitch_deg': t, 'Q': t}", Status.MODEL_FAILED, "must increase from before the input at 1 s"),
         ("t", Status.MODEL_FAILED, "a ndarray, and a mapping"),

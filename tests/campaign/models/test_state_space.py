@@ -20,6 +20,7 @@ from levelone.campaign.models.discrete_linear import time_response
 from levelone.campaign.models.protocol import ModelFailure
 from levelone.campaign.models.state_space import StateSpaceSource
 from levelone.config.model_table import Channel, StateSpaceTable
+from levelone.config.model_table import Test as FreeTest
 from levelone.dynamics.feedback import DelayedSystem, FeedbackLaw, Plant, closed
 from levelone.errors import InputError
 from levelone.handling.bandwidth import bandwidth
@@ -140,6 +141,23 @@ def test_what_a_late_law_sends_straight_to_an_output() -> None:
     np.testing.assert_allclose(system.frequency_response(1, 0, s.imag), expected, rtol=1e-12)
 
 
+@pytest.mark.theory
+@pytest.mark.parametrize("after", [0.0, 0.013, 0.02, 0.031])
+@pytest.mark.parametrize("tau", [0.4, 0.411])
+def test_jumps_through_a_late_law_reach_a_late_output_at_their_own_time(tau: float, after: float) -> None:
+    """y = 3 x' of the late integrator, read later: the jump of r passes straight through, between two samples or on one."""
+    dt = 0.02
+    one, zero = np.ones((1, 1)), np.zeros((1, 1))
+    system = replace(late_integrator(tau), C=zero, D_y=3.0 * one, output_delay=np.array([after]))
+    t = dt * np.arange(150) - after
+    since = [np.maximum(t - k * tau, 0.0) for k in range(20)]
+    parts = [(-1.0) ** (k + 1) * since[k] ** (k - 1) / math.factorial(k - 1) * (t > k * tau - 1e-9) for k in range(1, 20)]
+    np.testing.assert_allclose(time_response(system, 1, np.ones(150), dt)[0], 3.0 * np.sum(parts, axis=0), atol=2e-4)
+    u = np.random.default_rng(5).standard_normal(150)
+    fine = time_response(system, 1, np.repeat(u, 32), dt / 32)[:, ::32]
+    np.testing.assert_allclose(time_response(system, 1, u, dt), fine, atol=1e-4 * np.abs(fine).max())
+
+
 def test_a_delay_too_short_to_step_through_is_refused() -> None:
     with pytest.raises(InputError, match=r"delay: of 1e-06 s inside the loop"):
         time_response(late_integrator(1e-6), 1, np.ones(10), 0.004)
@@ -230,16 +248,15 @@ def test_bandwidth_of_a_second_order_attitude(delay: float, tmp_path: Path) -> N
         assert read.status_180 == Status.NO_OMEGA_180
 
 
-def test_units_signs_and_offsets_reach_the_record(tmp_path: Path) -> None:
+def test_units_and_signs_reach_the_record(tmp_path: Path) -> None:
     plain = reference_source(tmp_path).fly(NOMINAL, step("V_lon", 0.5, trim_speed=0.0))
     speed = replace(SPEED, sign=-1)
-    outputs = (replace(OUTPUTS[0], sign=-1), OUTPUTS[1], replace(OUTPUTS[2], offset=5.0))
+    outputs = (replace(OUTPUTS[0], sign=-1), OUTPUTS[1], OUTPUTS[2])
     mapped = reference_source(tmp_path, inputs=(speed,), outputs=outputs).fly(NOMINAL, step("V_lon", 0.5, trim_speed=0.0))
     np.testing.assert_allclose(mapped.channels["theta"], plain.channels["theta"], atol=1e-15)  # both signs turned
     np.testing.assert_allclose(mapped.channels["q"], -plain.channels["q"], atol=1e-15)
-    np.testing.assert_allclose(mapped.channels["V_lon"], 5.0 - plain.channels["V_lon"], atol=1e-14)
-    assert mapped.trim["V_lon"][0] == pytest.approx(5.0)
-    assert mapped.channels["V_lon_ref"][0, [0, -1]] == pytest.approx([5.0, 5.5])
+    np.testing.assert_allclose(mapped.channels["V_lon"], -plain.channels["V_lon"], atol=1e-14)
+    assert mapped.channels["V_lon_ref"][0, [0, -1]] == pytest.approx([0.0, 0.5])
 
 
 def test_a_record_knows_its_delay(tmp_path: Path) -> None:
@@ -253,6 +270,49 @@ def test_a_record_knows_its_delay(tmp_path: Path) -> None:
     assert record.delay[0] == pytest.approx(0.04)
     undelayed = reference_source(tmp_path).fly(NOMINAL, pulse("V_lon", 0.5, trim_speed=0.0))
     np.testing.assert_allclose(record.channels["q"][0, 10:], undelayed.channels["q"][0, :-10], atol=1e-13)
+
+
+LATE_ROLL = """
+[system]
+name = "late roll"
+[states]
+names = ["theta", "q", "p"]
+units = ["rad", "rad/s", "rad/s"]
+[inputs]
+names = ["stick"]
+units = ["1"]
+delay = [0.02]
+[outputs]
+names = ["theta", "q", "p", "h"]
+units = ["rad", "rad/s", "rad/s", "m"]
+delay = [0.3, 0.01, 0.5, 1.0]
+[matrices]
+A = [[0.0, 1.0, 0.0], [-25.0, -2.0, 0.0], [0.0, 0.0, -2.0]]
+B = [[0.0], [25.0], [5.0]]
+C = [[1.0, 0.0, 0.0], [0.0, 1.0, 1.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]
+"""
+
+
+@pytest.mark.theory
+def test_the_delay_of_a_record_is_that_of_the_rate_whose_damping_is_read(tmp_path: Path) -> None:
+    """A late altitude, attitude or rate of another axis would pass over peaks of the rate in question."""
+    path = tmp_path / "late_roll.toml"
+    path.write_text(LATE_ROLL)
+    units = {"theta": "rad", "q": "rad/s", "p": "rad/s", "altitude": "m"}
+    outputs = tuple(Channel(name, name.replace("altitude", "h"), unit, 1.0, 1) for name, unit in units.items())
+    stick = Channel("delta_lon", "stick", "1", 1.0, 1)
+    given = pulse("delta_lon", 0.1, trim_speed=0.0, flight_mode="direct")
+    free = {axis: FreeTest(axis, "dynamic_stability", axis, replace(given, name=axis)) for axis in ("pitch", "roll")}
+
+    def delay(mapped: tuple[Channel, ...], *tests: FreeTest) -> float:
+        source = StateSpaceSource(StateSpaceTable("state-space", (), (stick,), mapped, path), (), tests)
+        return float(source.fly(np.zeros(0), given).delay[0])
+
+    assert delay(outputs, free["pitch"]) == pytest.approx(0.03)
+    assert delay(outputs, free["roll"]) == delay(outputs, *free.values()) == pytest.approx(0.52)
+    assert delay(outputs, replace(free["roll"], manoeuvre=replace(given, amplitude=0.2)), free["pitch"]) == pytest.approx(0.03)
+    assert delay((*outputs[:2], outputs[3])) == pytest.approx(0.03)
+    assert delay(outputs) == pytest.approx(0.52)
 
 
 def test_an_unstable_system_has_diverged(tmp_path: Path) -> None:
@@ -287,7 +347,7 @@ def test_a_point_that_makes_no_system_is_its_own_failure(tmp_path: Path) -> None
             (),
             r"model.outputs.q.unit: is 'deg/s', and the file gives 'q' in 'rad/s'",
         ),
-        ((SPEED,), (replace(OUTPUTS[1], unit="m"),), (), r"model.outputs.q.unit: unit 'm' does not fit"),
+        ((SPEED,), (replace(OUTPUTS[1], unit="m"),), (), r"model.outputs.q.unit: is 'm', and the file gives 'q' in 'rad/s'"),
         ((SPEED,), OUTPUTS, ("A_qm",), r"factor.target: unknown name 'A_qm'; did you mean 'A_mq'"),
     ],
 )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from levelone.campaign.models.mapping import real_numbers
 from levelone.campaign.models.protocol import Evaluations, FloatArray, IntArray, ModelFailure, failed, settled
 from levelone.status import Status
 
@@ -106,12 +107,12 @@ def answered(answer: Mapping[str, Any], judge: Judge, seconds: float) -> Evaluat
 
 
 def number(name: str, value: Any) -> float:
-    """A number as a model wrote it, a float or an array without length; ModelFailure where it is none."""
-    if isinstance(value, bool | str | bytes) or value is None or np.ndim(value):
+    """A number as a model wrote it, a float or an array without length; ModelFailure where it is no real one."""
+    if isinstance(value, str | bytes) or value is None or np.ndim(value):
         raise ModelFailure(Status.MODEL_FAILED, f"response {name} is {_shown(value)}, and a number is needed")
     try:
-        return float(value)
-    except (TypeError, ValueError, OverflowError):
+        return float(real_numbers(value))
+    except (TypeError, ValueError):
         raise ModelFailure(Status.MODEL_FAILED, f"response {name} is {_shown(value)}, and a number is needed") from None
 
 

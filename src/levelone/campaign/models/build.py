@@ -71,19 +71,26 @@ def source_of(study: ModelStudy, keep_in: Path | None = None) -> HistorySource:
         return CommandHistories(table, study.targets, keep_in)
     if isinstance(table, FmuTable):
         from levelone.campaign.models.fmu import FmuSource
+        from levelone.campaign.models.fmu_archive import described
+        from levelone.campaign.models.fmu_variables import check_start_units
 
+        check_start_units(study.targets, _units(study), described(table.file, table.mode))
         return FmuSource(table, study.targets)
     if isinstance(table, JsbsimTable):
         from levelone.campaign.models.jsbsim import JsbsimSource
+        from levelone.campaign.models.jsbsim_properties import check_factor_units
 
+        check_factor_units(study.targets, _units(study))
         return JsbsimSource(table, study.targets)
     if isinstance(table, StateSpaceTable):
         from levelone.campaign.models.state_space import StateSpaceSource
 
-        linear = StateSpaceSource(table, study.targets)
-        linear.check()
-        return linear
+        return StateSpaceSource(table, study.targets, study.tests)
     raise TypeError(f"{type(table).__name__} is no description of a model")
+
+
+def _units(study: ModelStudy) -> tuple[str, ...]:
+    return tuple(factor.unit for factor in study.space.factors)
 
 
 def _built_in(table: BuiltInTable, study: ModelStudy) -> HistorySource:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter
@@ -15,11 +15,12 @@ import numpy as np
 
 from levelone.campaign.models import command_files as files
 from levelone.campaign.models.answers import Judge, answered, came_to_nothing, parameters_of
-from levelone.campaign.models.command_run import PARAMETERS, RESULTS, executable_of, run_command, template_files
-from levelone.campaign.models.keys import file_digest, files_digest, plain
+from levelone.campaign.models.command_run import PARAMETERS, RESULTS, executable_of, run_command, template_files, template_key
+from levelone.campaign.models.keys import file_digest, plain
 from levelone.campaign.models.mapping import channel_history, command_values, to_si
 from levelone.campaign.models.protocol import Evaluations, FloatArray, ModelFailure, joined
 from levelone.campaign.models.sources import sources_digest
+from levelone.campaign.models.travel import FieldsTravel
 from levelone.errors import InputError
 from levelone.status import Status
 
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class _Command:
+class _Command(FieldsTravel):
     """An executable, its template and what identifies both."""
 
     table: CommandTable
@@ -46,9 +47,6 @@ class _Command:
             for name in (*self.targets, *(name for name, _ in self.table.fixed)):
                 if name.split() != [name]:
                     raise InputError("factor.target", f"{name!r} holds white space, which ends a name in Dakota's format")
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def executable(self) -> Path:
@@ -66,7 +64,7 @@ class _Command:
             "arguments": list(table.arguments),
             "executable": file_digest(self.executable, "model.arguments.1"),
             "named": named,
-            "template": files_digest(folder, template_files(folder), "model.folder") if folder is not None else "none",
+            "template": template_key(folder) if folder is not None else "none",
             "format": table.format,
             "time_limit": plain(table.time_limit),
             "fixed": plain(table.fixed),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from levelone.campaign.models.mapping import real_numbers
 from levelone.campaign.models.protocol import FloatArray, ModelFailure
 from levelone.status import Status
 
@@ -89,7 +90,6 @@ def _manoeuvre(manoeuvre: Manoeuvre, channel: Channel) -> dict[str, Any]:
         "on": manoeuvre.on,
         "duration": manoeuvre.duration,
         "dt": 1.0 / manoeuvre.controller_rate,
-        "trim_speed": manoeuvre.trim_speed,
     }
     if math.isfinite(manoeuvre.off):
         told["off"] = manoeuvre.off
@@ -193,7 +193,7 @@ def _object(text: str) -> dict[str, Any]:
 def _series(name: str, values: Any) -> FloatArray:
     """A list of numbers; null is how some programs write a number that is not finite."""
     try:
-        return np.asarray(values, dtype=np.float64)
+        return real_numbers(values)
     except (TypeError, ValueError):
         raise _unreadable(f"channel {name} holds something that is no number") from None
 

@@ -11,8 +11,9 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
+from levelone.campaign.models.keys import files_digest
 from levelone.campaign.models.protocol import TAIL, ModelFailure
 from levelone.campaign.tether import Tether
 from levelone.config.model_table import CommandTable
@@ -72,6 +73,24 @@ def template_files(folder: Path) -> list[Path]:
     return files
 
 
+def template_key(folder: Path) -> dict[str, Any]:
+    """What identifies a template: the content of its files, which of them can be executed, and where its links lead.
+
+    Raises
+    ------
+    InputError
+        As of :func:`template_files`.
+    """
+    files = template_files(folder)
+    return {
+        "files": files_digest(folder, files, "model.folder"),
+        "executable": sorted(path.relative_to(folder).as_posix() for path in files if path.stat().st_mode & stat.S_IXUSR),
+        "links": {
+            path.relative_to(folder).as_posix(): os.readlink(path) for path in sorted(folder.rglob("*")) if path.is_symlink()
+        },
+    }
+
+
 def run_command(
     table: CommandTable, executable: Path, files: Mapping[str, str], read: Callable[[Path], T], key: str, keep_in: Path | None
 ) -> T:
@@ -98,6 +117,8 @@ def run_command(
     """
     with _directory(table) as work:
         try:
+            for name in (*files, RESULTS, OUTPUT):  # of the template: old results, or a link behind which another file lies
+                (work / name).unlink(missing_ok=True)
             for name, text in files.items():
                 (work / name).write_text(text, encoding="utf-8")
             _run(table, executable, work)

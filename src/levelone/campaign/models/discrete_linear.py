@@ -93,9 +93,13 @@ def time_response(system: DelayedSystem, column: int, u: FloatArray, dt: float) 
     """
     u = np.asarray(u, dtype=np.float64)
     values = _late(system, column, u, dt) if len(system.loop_delay) else _exact(system, column, u, dt)
-    for row, delay in enumerate(system.output_delay):  # what goes straight through changes at the moments of the input alone
+    # what goes straight through, a delay inside or not, jumps with the input: it is read at its own moments and not in between
+    for row, delay in enumerate(system.output_delay):
         late = _split(float(system.input_delay[column] + delay), dt)
         values[row] += system.D[row, column] * _shifted(u, late.whole + (1 if late.rest else 0))
+        for share, inside in zip(system.D_y[row] * system.D_z[:, column], system.loop_delay, strict=True):
+            late = _split(float(system.input_delay[column] + inside + delay), dt)
+            values[row] += share * _shifted(u, late.whole + (1 if late.rest else 0))
     return values
 
 
@@ -128,7 +132,7 @@ def _marched(phi: FloatArray, forcing: _Forcing) -> FloatArray:
 
 
 def _late(system: DelayedSystem, column: int, u: FloatArray, dt: float) -> FloatArray:
-    """[p, samples] C x and what leaves the delays inside, at the delays of the outputs, by the method of steps."""
+    """[p, samples] C x and what of the states leaves the delays inside, at the delays of the outputs, by the method of steps."""
     steps = _steps_of(system, column, dt)
     h, fine = dt / steps, np.repeat(u, steps)
     smooth = _stepped(system, column, fine, h)
@@ -154,14 +158,12 @@ def _steps_of(system: DelayedSystem, column: int, dt: float) -> int:
 
 
 def _stepped(system: DelayedSystem, column: int, u: FloatArray, h: float) -> FloatArray:
-    """[p, steps] C x and what leaves the delays inside, from rest."""
+    """[p, steps] C x and what of the states leaves the delays inside, from rest."""
     A, before = system.A, float(system.input_delay[column])
     forcings = [_forcing(A, system.B[:, column], u, before, h)]
-    passed = np.zeros((len(u), len(system.loop_delay)))
     for d in np.flatnonzero(system.D_z[:, column]):
         share = float(system.D_z[d, column])
         forcings.append(_forcing(A, share * system.B_z[:, d], u, before + float(system.loop_delay[d]), h))
-        passed[:, d] = share * (forcings[-1].u_older if forcings[-1].changes else forcings[-1].u_newer)
     late = [_split(float(delay), h) for delay in system.loop_delay]
     weights = np.stack([_polynomial_weights(A, system.B_z[:, d], h) for d in range(len(late))])
     read, seen = _method_of_steps(
@@ -176,7 +178,7 @@ def _stepped(system: DelayedSystem, column: int, u: FloatArray, h: float) -> Flo
         np.array([each.rest / h for each in late]),
         h,
     )
-    return (read + (seen + passed) @ system.D_y.T).T
+    return (read + seen @ system.D_y.T).T
 
 
 def _polynomial_weights(A: FloatArray, b: FloatArray, h: float) -> FloatArray:

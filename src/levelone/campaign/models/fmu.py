@@ -27,9 +27,9 @@ from levelone.campaign.models.fmu_archive import FIELD, MODES, described, librar
 from levelone.campaign.models.fmu_clock import Clock, CoSimulation, ModelExchange
 from levelone.campaign.models.fmu_variables import check_variables, references
 from levelone.campaign.models.keys import file_digest, plain, versions
-from levelone.campaign.models.mapping import channel_history, command_values, to_si
+from levelone.campaign.models.mapping import channel_history, command_values, sample_times, to_si
 from levelone.campaign.models.protocol import TAIL, FloatArray, ModelFailure
-from levelone.errors import InputError
+from levelone.config.model_table import whole_steps
 from levelone.status import Status
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class FmuSource:
             :func:`levelone.campaign.models.mapping.channel_history`.
         """
         folder, description = unpacked(self.table.file, self.table.mode, self.digest)
-        steps = _steps(manoeuvre.dt, self.table.step)
+        steps = 1 if self.table.step is None else whole_steps(manoeuvre.dt, self.table.step, "model.step")
         start = {**dict(self.table.fixed), **dict(zip(self.targets, map(float, point), strict=True))}
         said: list[str] = []
         with _ONE_AT_A_TIME, _caught_output() as printed, warnings.catch_warnings():
@@ -108,13 +108,6 @@ class FmuSource:
                 raise ModelFailure(Status.MODEL_FAILED, _with_words(_in_words(error), said, printed)) from None
         channels = {each.levelone: to_si(each, rows[:, i]) for i, each in enumerate(self.table.outputs)}
         return channel_history(time, channels, manoeuvre)
-
-
-def _steps(dt: float, step: float | None) -> int:
-    steps = 1 if step is None else round(dt / step)
-    if step is not None and (steps < 1 or abs(steps * step - dt) > 1e-6 * dt):
-        raise InputError("model.step", f"{step} s of the FMU does not divide the sampling interval of {dt} s of the test")
-    return steps
 
 
 def _fly(
@@ -178,7 +171,7 @@ def _run(
     before = math.ceil(table.settle / step - 1e-6)
     for k in range(before):
         clock.advance(k * step, step)
-    samples = math.floor(manoeuvre.duration / manoeuvre.dt + 1e-6) + 1
+    samples = len(sample_times(manoeuvre))
     times = np.arange((samples - 1) * steps + 1) * step
     read = _reader(fmu, references(table.outputs, description), [each.name for each in table.outputs])
     held = _reader(fmu, references([channel], description), [channel.name])()[0]

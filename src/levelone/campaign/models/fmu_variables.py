@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from levelone.campaign.models.fmu_archive import library
+from levelone.campaign.models.mapping import ratio_of_units
 from levelone.errors import InputError, closest, unknown_name
 
 if TYPE_CHECKING:
@@ -79,32 +80,62 @@ def _check_channel(field: str, channel: Channel, variables: dict[str, Any], desc
     variable = variables[channel.name]
     if variable.type not in REALS or variable.dimensions:
         raise InputError(f"{field}.name", f"{channel.name!r} is no single real number ({variable.type})")
-    unit = variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
+    unit = _declared(variable)
     if unit and unit != channel.unit:
         _check_unit(f"{field}.unit", channel, unit, description)
 
 
+def _declared(variable: Any) -> str | None:
+    return variable.unit or (variable.declaredType.unit if variable.declaredType is not None else None)
+
+
+def _base_unit(declared: str, description: Any) -> Any:
+    return next((each.baseUnit for each in description.unitDefinitions if each.name == declared), None)
+
+
 def _check_unit(field: str, channel: Channel, declared: str, description: Any) -> None:
     """The FMU's own unit against that of the study, by its base units where it states them, else by its name."""
-    from levelone.config.units import to_si
     from levelone.handling.manoeuvres import UNITS
     from levelone.handling.records import CHANNEL_UNITS
 
-    problem = InputError(field, f"is {channel.unit!r}, but the FMU declares {declared!r} for {channel.name!r}")
-    base = next((each.baseUnit for each in description.unitDefinitions if each.name == declared), None)
-    if base is None:
-        try:
-            factor = to_si(1.0, declared, channel.unit, field)
-        except InputError as error:
-            if "does not fit" in str(error):
-                raise problem from None
-            return  # a name that only its own tool knows: the study's word stands
-        if not math.isclose(factor, 1.0, rel_tol=1e-6):
-            raise problem
-        return
+    base = _base_unit(declared, description)
     si = UNITS.get(channel.levelone) or CHANNEL_UNITS.get(channel.levelone)
-    if si in DIMENSIONS:
-        others = any((base.kg, base.A, base.K, base.mol, base.cd))
-        fits = not others and (base.m, base.s) == DIMENSIONS[si][:2] and base.rad in (0, DIMENSIONS[si][2])
-        if not fits or not math.isclose(base.factor, channel.scale, rel_tol=1e-6):
-            raise problem
+    if base is None:
+        fits = _same(ratio_of_units(channel.unit, declared))
+    elif si in DIMENSIONS:
+        alike = (base.m, base.s) == DIMENSIONS[si][:2] and base.rad in (0, DIMENSIONS[si][2])
+        fits = alike and not _others(base) and math.isclose(base.factor, channel.scale, rel_tol=1e-6)
+    else:
+        fits = True
+    if not fits:
+        raise InputError(field, f"is {channel.unit!r}, but the FMU declares {declared!r} for {channel.name!r}")
+
+
+def _others(base: Any) -> bool:
+    return any((base.kg, base.A, base.K, base.mol, base.cd))
+
+
+def _same(ratio: float | None) -> bool:
+    """Whether two units are one; a name that only its own tool knows cannot contradict the study's word."""
+    return ratio is None or math.isclose(ratio, 1.0, rel_tol=1e-6)
+
+
+def check_start_units(targets: Sequence[str], units: Sequence[str], description: Any) -> None:
+    """InputError where the unit of a factor contradicts the one that the FMU declares for the start value which it sets.
+
+    Targets are those of a source that was accepted, or names that there are not, which are passed over here.
+    """
+    variables = {variable.name: variable for variable in description.modelVariables}
+    for target, unit in zip(targets, units, strict=True):
+        declared = _declared(variables[target]) if target in variables else None
+        if declared and declared != unit and not _start_fits(unit, declared, _base_unit(declared, description)):
+            raise InputError("factor.unit", f"is {unit!r}, but the FMU declares {declared!r} for {target!r}")
+
+
+def _start_fits(unit: str, declared: str, base: Any) -> bool:
+    """By base units, where radians may be left out as SI allows; by name where there are none, or ones that are unknown here."""
+    if base is None or any((base.A, base.K, base.mol, base.cd, base.offset)):
+        return _same(ratio_of_units(unit, declared))
+    own = f"kg**{base.kg} * m**{base.m} * s**{base.s}"
+    ratios = [ratio_of_units(unit, f"{own} * rad**{power}") for power in ((base.rad,) if base.rad else (0, 1, -1, 2, -2))]
+    return any(ratio is None or math.isclose(ratio, base.factor, rel_tol=1e-6) for ratio in ratios)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
@@ -16,6 +16,8 @@ from levelone.campaign.models.keys import file_digest, files_digest
 from levelone.errors import InputError, closest, unknown_name
 
 FIELD = "model.function"
+#: folder of a study, or installed package -> hash of its code when it was last imported for a model
+_LOADED: dict[Path | str, str] = {}
 
 
 def function_of(where: str, folder: Path | None) -> Callable[..., Any]:
@@ -58,7 +60,7 @@ def code_digest(where: str, folder: Path | None) -> str:
     module, _ = _split(where)
     top = module.partition(".")[0]
     own = files_digest(folder, _code(folder), "model.folder") if folder is not None else ""
-    if folder is not None and any(path.exists() for path in (folder / top, folder / f"{top}.py")):
+    if _lies_in(folder, top):
         return own
     spec = importlib.util.find_spec(top)
     if spec is None:
@@ -94,12 +96,15 @@ def _searched_first(folder: Path | None) -> Iterator[None]:
     if folder is None:
         yield
         return
-    text = str(folder)
+    text, written = str(folder), sys.dont_write_bytecode
     sys.path.insert(0, text)
+    # bytecode is found again by the second and the size of its source: an edit can keep both
+    sys.dont_write_bytecode = True
     importlib.invalidate_caches()
     try:
         yield
     finally:
+        sys.dont_write_bytecode = written
         if text in sys.path:
             sys.path.remove(text)
 
@@ -108,6 +113,7 @@ def _imported(module: str, folder: Path | None) -> ModuleType:
     top = module.partition(".")[0]
     with _searched_first(folder):
         _forget_namesake(top)
+        _forget_others(top, folder)
         try:
             return importlib.import_module(module)
         except ModuleNotFoundError as error:
@@ -126,8 +132,55 @@ def _forget_namesake(top: str) -> None:
     spec = PathFinder.find_spec(top)
     if spec is not None and spec.origin is not None and Path(spec.origin) == Path(file):
         return
-    for name in [each for each in sys.modules if each == top or each.startswith(f"{top}.")]:
+    _forget(name for name in sys.modules if _is_part(name, top))
+
+
+def _forget_others(top: str, folder: Path | None) -> None:
+    """Forget what would answer in place of the code as it is now: what other studies' folders gave, and what has changed since.
+
+    Otherwise the ``params.py`` of one study would serve another, and code from before an edit would answer under the hash of the
+    code after it.
+    """
+    now: dict[Path | str, str] = {}
+    if folder is not None:
+        now[folder] = files_digest(folder, _code(folder), "model.folder")
+    spec = PathFinder.find_spec(top)
+    if spec is not None and top != __name__.partition(".")[0] and not _lies_in(folder, top):
+        now[top] = _package_digest(spec)
+    if folder is not None and folder not in _LOADED:
+        _forget_folder(folder)  # imported by somebody else, nobody knows from which state of its files
+    for place, digest in list(_LOADED.items()):
+        if isinstance(place, Path) and now.get(place) != digest:
+            _forget_folder(place)
+            del _LOADED[place]
+        elif isinstance(place, str) and now.get(place, digest) != digest:
+            _forget(name for name in sys.modules if _is_part(name, place))
+    _LOADED.update(now)
+
+
+def _forget_folder(folder: Path) -> None:
+    """Forget the modules that lie where an import with this folder on the path finds them."""
+    start = folder.absolute()
+
+    def given(name: str, module: ModuleType) -> bool:
+        file, place = getattr(module, "__file__", None), start.joinpath(*name.split("."))
+        return file is not None and Path(file) in (place.with_name(f"{place.name}.py"), place / "__init__.py")
+
+    kept = ("__main__", __name__.partition(".")[0])
+    _forget(name for name, module in sys.modules.items() if name.partition(".")[0] not in kept and given(name, module))
+
+
+def _forget(names: Iterable[str]) -> None:
+    for name in list(names):
         del sys.modules[name]
+
+
+def _is_part(name: str, top: str) -> bool:
+    return name == top or name.startswith(f"{top}.")
+
+
+def _lies_in(folder: Path | None, top: str) -> bool:
+    return folder is not None and any(path.exists() for path in (folder / top, folder / f"{top}.py"))
 
 
 def _no_module(module: str, folder: Path | None) -> InputError:

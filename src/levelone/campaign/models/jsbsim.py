@@ -12,7 +12,6 @@ take the step as it then is; ``initial``, and ``fixed`` and factors under ``ic/`
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,20 +23,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from levelone.campaign.models.jsbsim_properties import check_properties, listing
 from levelone.campaign.models.keys import files_digest, plain, versions
-from levelone.campaign.models.mapping import channel_history, command_values, to_si
+from levelone.campaign.models.mapping import channel_history, command_values, sample_times, to_si
 from levelone.campaign.models.protocol import FloatArray, ModelFailure
-from levelone.errors import InputError, closest, unknown_name
+from levelone.config.model_table import whole_steps
+from levelone.errors import InputError, closest
 from levelone.status import Status
 
 if TYPE_CHECKING:
-    from levelone.config.model_table import Channel, JsbsimTable
+    from levelone.config.model_table import JsbsimTable
     from levelone.handling.history import TimeHistory
     from levelone.handling.manoeuvres import Manoeuvre
-
-#: what the end of a property's name says of its unit, by JSBSim's own convention
-SUFFIXES = {"rad": "rad", "deg": "deg", "rad_sec": "rad/s", "deg_sec": "deg/s", "ft": "ft", "fps": "ft/s", "kts": "kt", "norm": "1"}
-Listing = Mapping[str, str]
 
 
 def _library() -> Any:
@@ -72,7 +69,7 @@ class JsbsimSource:
     def __post_init__(self) -> None:
         with _listening() as said:
             aircraft = _loaded(self.table, said)
-            _check(self.table, self.targets, _listing(aircraft))
+            check_properties(self.table, self.targets, listing(aircraft))
 
     @cached_property
     def key(self) -> Mapping[str, Any]:
@@ -98,13 +95,13 @@ class JsbsimSource:
             TRIM_FAILED; DIVERGED: it touches the ground; MODEL_FAILED: JSBSim ends the run, with its messages; see also
             :func:`levelone.campaign.models.mapping.channel_history`.
         """
-        frames = _frames(manoeuvre.dt, self.table.step)
+        frames = whole_steps(manoeuvre.dt, self.table.step, "model.step")
         jsbsim = _library()
         with _listening() as said:
             try:
                 aircraft = _loaded(self.table, said)
-                _begin(aircraft, self.table, list(zip(self.targets, map(float, point), strict=True)))
-                time, channels = _fly(aircraft, self.table, manoeuvre, frames)
+                ground = _begin(aircraft, self.table, list(zip(self.targets, map(float, point), strict=True)))
+                time, channels = _fly(aircraft, self.table, manoeuvre, frames, ground)
             except jsbsim.TrimFailureError as error:
                 raise ModelFailure(Status.TRIM_FAILED, f"{error}\n{_text(said)}") from None
             except (jsbsim.BaseError, RuntimeError) as error:
@@ -176,67 +173,25 @@ def _loaded(table: JsbsimTable, said: list[str]) -> Any:
     return aircraft
 
 
-def _plain_name(name: str) -> str:
-    """A property's name without the index 0, which may be written or left out at every level."""
-    return name.replace("[0]", "")
-
-
-def _listing(aircraft: Any) -> Listing:
-    """Properties of an aircraft, each with what may be done to it: R, W or RW."""
-    lines = aircraft.query_property_catalog("").splitlines()
-    pairs = (line.strip().rpartition(" ") for line in lines if line.strip().endswith(")"))
-    return {_plain_name(name): access.strip("()") for name, _, access in pairs}
-
-
-def _check(table: JsbsimTable, targets: Sequence[str], listing: Listing) -> None:
-    for where, names in (("initial", table.initial), ("set", table.set), ("fixed", table.fixed)):
-        for name, _ in names:
-            _check_property(f"model.{where}", name, "W", listing)
-    for target in targets:
-        _check_property("factor.target", target, "W", listing)
-    for group, channels, access in (("inputs", table.inputs, "W"), ("outputs", table.outputs, "R")):
-        for channel in channels:
-            field = f"model.{group}.{channel.levelone}"
-            _check_property(f"{field}.name", channel.name, access, listing)
-            _check_unit(f"{field}.unit", channel)
-    seen: set[str] = set()
-    for name in (*(name for part in (table.initial, table.set, table.fixed) for name, _ in part), *targets):
-        if _plain_name(name) in seen:
-            raise InputError("model.set", f"property {name!r} is set twice: which value holds would be hidden in the order")
-        seen.add(_plain_name(name))
-
-
-def _check_property(field: str, name: str, access: str, listing: Listing) -> None:
-    allowed = listing.get(_plain_name(name))
-    if allowed is None:
-        raise unknown_name(field, name, listing)
-    if access not in allowed:
-        able = [each for each, how in listing.items() if access in how]
-        verb = "set: JSBSim computes it" if access == "W" else "read: JSBSim takes it as an order only"
-        raise InputError(field, f"property {name!r} cannot be {verb}; {closest(name, able)}")
-
-
-def _check_unit(field: str, channel: Channel) -> None:
-    from levelone.config.units import to_si
-
-    suffix = re.sub(r"\[\d+\]$", "", channel.name).rpartition("-")[2]
-    unit = SUFFIXES.get(suffix)
-    if unit is not None and not math.isclose(to_si(1.0, channel.unit, unit, field), 1.0, rel_tol=1e-9):
-        raise InputError(field, f"is {channel.unit!r}, but the name of property {channel.name!r} says {unit!r}")
-
-
-def _frames(dt: float, step: float) -> int:
-    frames = round(dt / step)
-    if frames < 1 or abs(frames * step - dt) > 1e-6 * dt:
-        raise InputError("model.step", f"{step} s of JSBSim does not divide the sampling interval of {dt} s of the test")
-    return frames
-
-
 def _is_initial(name: str) -> bool:
     return name.startswith("ic/")
 
 
-def _begin(aircraft: Any, table: JsbsimTable, factors: Sequence[tuple[str, float]]) -> None:
+class _Ground:
+    """The ground under an aircraft, on which it may stand when time begins, and which it may not fall on later."""
+
+    def __init__(self, aircraft: Any) -> None:
+        tree = aircraft.get_property_manager()
+        self._touches = [tree.get_node(name).get_double_value for name in listing(aircraft) if name.endswith("/WOW")]
+        self._stands = any(touches() for touches in self._touches)
+
+    def check(self, when: str, time: float) -> None:
+        """ModelFailure where an aircraft that did not stand touches the ground."""
+        if not self._stands and any(touches() for touches in self._touches):
+            raise ModelFailure(Status.DIVERGED, f"the aircraft touches the ground {when} {time:.3g} s: begin higher")
+
+
+def _begin(aircraft: Any, table: JsbsimTable, factors: Sequence[tuple[str, float]]) -> _Ground:
     """Everything that happens before the first frame of the record."""
     varied = (*table.fixed, *factors)
     for name, value in (*table.initial, *(pair for pair in varied if _is_initial(pair[0]))):
@@ -250,29 +205,32 @@ def _begin(aircraft: Any, table: JsbsimTable, factors: Sequence[tuple[str, float
     for channel in table.inputs:
         if channel.trim is not None:
             aircraft[channel.name] = channel.trim
-    for _ in range(round(table.settle / table.step)):
+    ground = _Ground(aircraft)  # a trim that was asked for may have put the aircraft down
+    for k in range(round(table.settle / table.step)):
         _frame(aircraft)
+        ground.check("while it settles, after", (k + 1) * table.step)
+    return ground
 
 
-def _fly(aircraft: Any, table: JsbsimTable, manoeuvre: Manoeuvre, frames: int) -> tuple[FloatArray, dict[str, FloatArray]]:
+def _fly(
+    aircraft: Any, table: JsbsimTable, manoeuvre: Manoeuvre, frames: int, ground: _Ground
+) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Times and channels of the record, SI."""
     channel = table.command(manoeuvre.axis)
     tree = aircraft.get_property_manager()
     set_input = tree.get_node(channel.name).set_double_value
     reads = [tree.get_node(each.name).get_double_value for each in table.outputs]
-    contacts = [tree.get_node(name).get_double_value for name in _listing(aircraft) if name.endswith("/WOW")]
-    samples = math.floor(manoeuvre.duration / manoeuvre.dt + 1e-6) + 1
+    samples = len(sample_times(manoeuvre))
     steps = np.arange((samples - 1) * frames + 1) * (manoeuvre.dt / frames)
     commands = command_values(channel, manoeuvre, steps, aircraft[channel.name]).tolist()
-    standing, rows = any(touches() for touches in contacts), np.empty((samples, len(reads)))
+    rows = np.empty((samples, len(reads)))
     for k, value in enumerate(commands):
         set_input(value)
         _frame(aircraft)
         if k % frames:
             continue
         rows[k // frames] = [read() for read in reads]
-        if not standing and any(touches() for touches in contacts):
-            raise ModelFailure(Status.DIVERGED, f"the aircraft touches the ground at t = {steps[k]:.3g} s: begin higher")
+        ground.check("at t =", float(steps[k]))
     return steps[::frames], {each.levelone: to_si(each, rows[:, i]) for i, each in enumerate(table.outputs)}
 
 

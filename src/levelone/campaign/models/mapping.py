@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,14 +22,51 @@ if TYPE_CHECKING:
 SHORT = 1.5
 
 
+def real_numbers(values: Any) -> FloatArray:
+    """Numbers as a model answered them, of any shape; those that it masked are NaN.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Something that is no real number: a complex number would lose its imaginary part, a truth value or a date become a number
+        that nobody stated.
+    """
+    given = values if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+    mixed = values if isinstance(values, list | tuple) else given.flat if given.dtype.kind == "O" else ()
+    if given.dtype.kind in "cbmM" or any(isinstance(each, bool | np.bool_) for each in mixed):
+        raise TypeError(f"truth values, complex numbers and times are no real numbers: {given.dtype}")
+    try:
+        numbers = given.astype(np.float64)
+    except OverflowError as error:
+        raise ValueError(str(error)) from None
+    return np.asarray(numbers.filled(np.nan) if isinstance(numbers, np.ma.MaskedArray) else numbers)
+
+
 def to_si(channel: Channel, values: ArrayLike) -> FloatArray:
-    """Values of a channel in SI and rad, with levelone's sign, from those of the model; any shape."""
-    return channel.sign * channel.scale * np.asarray(values, dtype=np.float64) + channel.offset
+    """Values of a channel in SI and rad, with levelone's sign, from those of the model; any shape.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As of :func:`real_numbers`.
+    """
+    return channel.sign * channel.scale * real_numbers(values)
 
 
-def from_si(channel: Channel, values: ArrayLike) -> FloatArray:
-    """Values of a channel in the model's unit and sign from those in SI; any shape."""
-    return (np.asarray(values, dtype=np.float64) - channel.offset) / (channel.sign * channel.scale)
+def ratio_of_units(unit: str, own: str) -> float | None:
+    """How many units ``own`` one ``unit`` is; NaN where they measure different things, None where one is unknown here."""
+    from levelone.config.units import to_si as in_unit
+
+    if unit == own:
+        return 1.0
+    for each, expected in ((unit, "1"), (own, "1"), (unit, own)):
+        try:
+            ratio = float(in_unit(1.0, each, expected, "unit"))
+        except InputError as error:
+            if "does not fit" not in error.problem:
+                return None
+            ratio = math.nan
+    return ratio
 
 
 def change_of_input(channel: Channel, manoeuvre: Manoeuvre) -> Manoeuvre:
@@ -66,6 +103,13 @@ def name_of_input(manoeuvre: Manoeuvre) -> str:
     return manoeuvre.axis if manoeuvre.axis.startswith("delta_") else f"{manoeuvre.axis}_ref"
 
 
+def sample_times(manoeuvre: Manoeuvre) -> FloatArray:
+    """Times [sample] at which a record of a manoeuvre is sampled, s: multiples of its ``dt`` from 0 to its end."""
+    from dataclasses import replace
+
+    return replace(manoeuvre, controller_rate=1.0 / manoeuvre.dt).ticks()
+
+
 def channel_history(
     time: ArrayLike,
     channels: Mapping[str, ArrayLike],
@@ -93,6 +137,7 @@ def channel_history(
     -------
     TimeHistory
         One run; trims are means before the input, and the command moves from the trim of its own channel where that is recorded.
+        Roll and heading may be recorded within a turn; here they are without jumps.
 
     Raises
     ------
@@ -104,6 +149,9 @@ def channel_history(
 
     t = _checked_time(time, manoeuvre)
     series = {key: _checked_channel(key, values, t) for key, values in channels.items()}
+    for angle in ("phi", "psi"):  # about north a heading jumps by a turn, and the mean of both sides is the way south
+        if angle in series:
+            series[angle] = np.unwrap(series[angle])
     before = t < manoeuvre.on - 1e-9
     moved = series.get(manoeuvre.axis)
     base = 0.0 if moved is None or name_of_input(manoeuvre) == manoeuvre.axis else float(moved[before].mean())
@@ -155,7 +203,7 @@ def _checked_channel(name: str, values: ArrayLike, time: FloatArray) -> FloatArr
 
 def _numbers(name: str, values: ArrayLike) -> FloatArray:
     try:
-        series = np.asarray(values, dtype=np.float64)
+        series = real_numbers(values)
     except (TypeError, ValueError):
         raise ModelFailure(Status.MODEL_FAILED, f"channel {name} holds something that is no number") from None
     if series.ndim != 1:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -26,13 +26,13 @@ from levelone.campaign.models.protocol import (
 from levelone.campaign.models.readings import (
     Result,
     has_level,
-    integrated,
     numbers,
     read,
-    read_response,
+    read_linear,
     undefined,
 )
 from levelone.campaign.models.sources import sources_digest
+from levelone.campaign.models.travel import FieldsTravel
 from levelone.config.model_table import response_names
 from levelone.errors import InputError
 from levelone.handling.damping import DynamicStability
@@ -52,7 +52,7 @@ PICKING = ("attitude_quickness", "dynamic_stability")
 
 
 @dataclass(frozen=True, eq=False)
-class HistoryModel:
+class HistoryModel(FieldsTravel):
     """A flight simulation under the tests of a study.
 
     Parameters
@@ -86,9 +86,6 @@ class HistoryModel:
     boundaries: Boundaries
     keep_histories: bool = False
     picks: Mapping[str, Result] | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -196,9 +193,7 @@ class HistoryModel:
         return results, records
 
     def _linear(self, point: FloatArray, test: Test) -> Result:
-        source = cast(LinearSource, self.source)
-        response = source.frequency_response(point, test.manoeuvre.axis, str(test.output), np.array(test.omega))
-        return read_response(test, integrated(test, response.scaled(float(test.sign))), self.boundaries)
+        return read_linear(test, cast(LinearSource, self.source), point, self.boundaries)
 
 
 def _attempt(call: Callable[[], T]) -> T | ModelFailure:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -14,9 +14,10 @@ import numpy as np
 from levelone.campaign.models.answers import Judge, answered, came_to_nothing, parameters_of
 from levelone.campaign.models.importing import code_digest, function_of
 from levelone.campaign.models.keys import plain, versions
-from levelone.campaign.models.mapping import change_of_input, channel_history, to_si
+from levelone.campaign.models.mapping import change_of_input, channel_history, real_numbers, to_si
 from levelone.campaign.models.protocol import Evaluations, FloatArray, ModelFailure, joined
 from levelone.campaign.models.sources import sources_digest
+from levelone.campaign.models.travel import FieldsTravel
 from levelone.errors import InputError
 from levelone.status import Status
 
@@ -28,14 +29,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class _Function:
+class _Function(FieldsTravel):
     """A function that is imported when it is first called, in the process that calls it."""
 
     table: PythonTable
     targets: tuple[str, ...]
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @cached_property
     def function(self) -> Callable[..., Any]:
@@ -223,7 +221,7 @@ def _first(answer: Any) -> Any:
 def _only(name: str, value: Any) -> Any:
     if np.shape(value) != (1,):
         raise ModelFailure(Status.MODEL_FAILED, f"response {name} has shape {np.shape(value)} for one point, and (1,) is needed")
-    return np.asarray(value)[0]
+    return np.asanyarray(value)[0]  # a masked one stays masked
 
 
 def _columns(answer: Any, names: Sequence[str], n: int) -> FloatArray | None:
@@ -231,6 +229,6 @@ def _columns(answer: Any, names: Sequence[str], n: int) -> FloatArray | None:
     if not isinstance(answer, Mapping) or any(name not in answer or np.shape(answer[name]) != (n,) for name in names):
         return None
     try:
-        return np.column_stack([np.asarray(answer[name], dtype=np.float64) for name in names])
+        return np.column_stack([real_numbers(answer[name]) for name in names])
     except (TypeError, ValueError):
         return None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from levelone.campaign.models.answers import axis_of_limits
-from levelone.campaign.models.protocol import FloatArray, IntArray, ModelFailure
+from levelone.campaign.models.protocol import FloatArray, IntArray, LinearSource, ModelFailure
 from levelone.config.model_table import quantities
 from levelone.handling.axes import RATE_AND_ATTITUDE, RotationAxis
 from levelone.handling.bandwidth import Bandwidth, bandwidth
@@ -91,6 +91,12 @@ def read(test: Test, record: TimeHistory, boundaries: Boundaries) -> Result:
         omega_max=test.manoeuvre.omega_max,
     )
     return read_response(test, integrated(test, response), boundaries)
+
+
+def read_linear(test: Test, source: LinearSource, point: FloatArray, boundaries: Boundaries) -> Spectral:
+    """The bandwidth of a test on the exact frequency response of a source at a point; raises ModelFailure."""
+    response = source.frequency_response(point, test.manoeuvre.axis, str(test.output), np.array(test.omega))
+    return read_response(test, integrated(test, response.scaled(float(test.sign))), boundaries)
 
 
 def integrated(test: Test, response: FrequencyResponse) -> FrequencyResponse:

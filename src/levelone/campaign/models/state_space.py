@@ -2,13 +2,14 @@
 
 Its frequency response is exact, delays included. Its time response is exact at the samples for the command that is held from
 sample to sample, unless a delay lies inside a loop: see :mod:`levelone.campaign.models.discrete_linear`. Channels are changes from
-trim (plus the ``offset`` that the study states), so that a speed begins at zero.
+trim, so that a speed begins at zero.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,13 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from levelone.campaign.models.keys import file_digest, plain, versions
-from levelone.campaign.models.mapping import change_of_input, channel_history, to_si
+from levelone.campaign.models.mapping import change_of_input, channel_history, ratio_of_units, sample_times, to_si
 from levelone.campaign.models.protocol import FloatArray, ModelFailure
 from levelone.config.model_table import Channel, StateSpaceTable
 from levelone.errors import InputError, unknown_name
 from levelone.status import Status
 
 if TYPE_CHECKING:
+    from levelone.config.model_table import Test
     from levelone.config.state_space_model import StateSpaceFile
     from levelone.dynamics.feedback import DelayedSystem
     from levelone.handling.frequency import FrequencyResponse
@@ -46,6 +48,9 @@ class StateSpaceSource:
         The file, parameters that are set, and where commands and channels lie in it.
     targets
         Parameters of the file that the factors set, in its own units.
+    tests
+        What is read on the records: the delay of a record is that of the rate whose free response a test reads on it, or the
+        longest of all three rates where no test does.
 
     Raises
     ------
@@ -55,6 +60,7 @@ class StateSpaceSource:
 
     table: StateSpaceTable
     targets: tuple[str, ...]
+    tests: tuple[Test, ...] = ()
 
     def __post_init__(self) -> None:
         self.check()
@@ -96,14 +102,14 @@ class StateSpaceSource:
         """One run; see :meth:`levelone.campaign.models.protocol.HistorySource.fly`."""
         file, channel = self._file(), self._command(manoeuvre.axis)
         column = file.inputs.index(channel.name)
-        time = manoeuvre.dt * np.arange(int(np.floor(manoeuvre.duration / manoeuvre.dt + 1e-9)) + 1)
+        time = sample_times(manoeuvre)
         u = change_of_input(channel, manoeuvre).command(time)
         with _one_thread():
             system = self._system(point)
             values = self._flown(system, column, u, manoeuvre.dt)
         rows = {each.levelone: file.outputs.index(each.name) for each in self.table.outputs}
         channels = {each.levelone: to_si(each, values[rows[each.levelone]]) for each in self.table.outputs}
-        late = [system.transport(column, row) for row in rows.values()]
+        late = [system.transport(column, row) for name, row in rows.items() if name in self._freely_read(manoeuvre)]
         delay = max((each for each in late if np.isfinite(each)), default=0.0)
         return channel_history(time, channels, manoeuvre, delay=delay)
 
@@ -124,6 +130,15 @@ class StateSpaceSource:
             value = self._answered(self._system(point), file.inputs.index(into.name), file.outputs.index(out.name), omega)
         scale = out.sign * out.scale / (into.sign * into.scale)
         return FrequencyResponse(np.asarray(omega, dtype=np.float64), scale * value)
+
+    def _freely_read(self, manoeuvre: Manoeuvre) -> tuple[str, ...]:
+        """Channels whose free response is read on a manoeuvre, the only reading that needs a delay."""
+        from levelone.handling.axes import RATE_AND_ATTITUDE
+
+        rates = {axis: rate for axis, (rate, _) in RATE_AND_ATTITUDE.items()}
+        free = [each for each in self.tests if each.criterion == "dynamic_stability"]
+        read = tuple(rates[str(each.axis)] for each in free if replace(each.manoeuvre, name=manoeuvre.name) == manoeuvre)
+        return read or tuple(rates.values())
 
     def _file(self) -> StateSpaceFile:
         return _read(self.table.file)
@@ -189,12 +204,11 @@ def _mapped(field: str, name: str, channels: tuple[Channel, ...]) -> Channel:
 
 
 def _check_channel(field: str, channel: Channel, units: Mapping[str, str]) -> None:
-    from levelone.config.units import to_si as in_unit
-
     if channel.name not in units:
         raise unknown_name(f"{field}.name", channel.name, units)
     unit = units[channel.name]
-    if abs(in_unit(1.0, channel.unit, unit, f"{field}.unit") - 1.0) > 1e-12:
+    ratio = ratio_of_units(channel.unit, unit)
+    if ratio is None or not math.isclose(ratio, 1.0, rel_tol=1e-12):
         raise InputError(f"{field}.unit", f"is {channel.unit!r}, and the file gives {channel.name!r} in {unit!r}: write that unit")
 
 
