@@ -182,6 +182,18 @@ def test_ctrl_c_and_errors_inside_the_study_end_with_one_line(monkeypatch, finis
     assert finished == []
 
 
+def test_an_interrupted_campaign_says_once_how_to_go_on(monkeypatch, tmp_path):
+    from levelone.campaign.evaluate import CampaignInterrupted
+
+    def run_model_study(*_, **__):
+        raise CampaignInterrupted(3, 10)
+
+    monkeypatch.setattr("levelone.campaign.model_study.run_model_study", run_model_study)
+    done = call("run", STUDY.parents[1] / "own-model" / "study.toml", "--out", tmp_path / "out")
+    assert done.exit_code == 130
+    assert done.stderr.strip().splitlines()[-1].startswith("interrupted after 3 of 10 evaluations; those are kept")
+
+
 def test_report_needs_the_folder_of_a_finished_study(tmp_path):
     assert "results" in refused(call("report", tmp_path))
 

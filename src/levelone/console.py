@@ -32,8 +32,8 @@ class Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except LeveloneError as error:
-            interrupted = error.exit_code == INTERRUPTED
-            say(f"{'interrupted' if interrupted else 'error'}: {' '.join(str(error).split())}")
+            text = " ".join(str(error).split())
+            say(text if error.exit_code == INTERRUPTED else f"error: {text}")
             raise typer.Exit(error.exit_code) from None
         except KeyboardInterrupt:
             say("interrupted: what was not finished has not been written")

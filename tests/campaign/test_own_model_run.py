@@ -181,3 +181,11 @@ def test_files_that_change_while_a_campaign_runs_end_it(study: ModelStudy, tmp_p
 
     with pytest.raises(InputError, match="files have changed since the campaign began"):
         run_model_study(study, tmp_path / "out", on_tally=edited)
+
+
+def test_progress_reaches_the_size_of_the_design(study: ModelStudy, tmp_path: Path) -> None:
+    """Points that a screening visits twice are evaluated once, and counted as often as they come."""
+    last: dict[str, tuple[int, int]] = {}
+    run_model_study(study, tmp_path / "out", progress=lambda stage, done, total: last.update({stage: (done, total)}))
+    assert last["screening (Morris)"] == (9, 9)
+    assert last["Monte Carlo"] == (24, 24)

@@ -65,7 +65,7 @@ class StoredModel:
 
         def told(tally: Tally) -> None:
             last[:] = [tally]
-            progress(tally.done)
+            progress(len(points) if tally.done == tally.total else tally.done)  # a point that comes twice is evaluated once
             self.on_tally(tally)
 
         found = evaluate(self.model, points, self.store, self.executor, told, retry_failed=self.retry_failed, records=self.records)
