@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from levelone.campaign.models.keys import plain
 from levelone.campaign.models.mapping import real_numbers
 from levelone.campaign.models.protocol import Evaluations, FloatArray, IntArray, ModelFailure, failed, settled
+from levelone.campaign.models.sources import sources_digest
 from levelone.status import Status
 
 if TYPE_CHECKING:
@@ -83,6 +86,39 @@ class Judge:
         from levelone.handling.translation import rise_time_levels
 
         return rise_time_levels(numbers[0], self.boundaries)
+
+
+class Answering:
+    """What models that answer responses themselves have in common, whatever answers: names, units, Levels."""
+
+    table: Any
+    boundaries: Boundaries
+    task: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the responses."""
+        return tuple(each.name for each in self.table.responses)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Their units."""
+        return tuple(each.unit for each in self.table.responses)
+
+    @property
+    def judged(self) -> tuple[str, ...]:
+        """Criteria that have a Level."""
+        return self._judge.judged
+
+    @cached_property
+    def _judge(self) -> Judge:
+        return Judge(self.table.responses, self.boundaries, self.task)
+
+    @property
+    def key(self) -> Mapping[str, Any]:
+        """As of what answers, with the boundaries of the Levels and the code that judges by them."""
+        own: Mapping[str, Any] = super().key  # type: ignore[misc]  # of the class that answers, which comes next
+        return {**own, "boundaries": plain(self.boundaries), "task": self.task, "sources": sources_digest()}
 
 
 def answered(answer: Mapping[str, Any], judge: Judge, seconds: float) -> Evaluations:

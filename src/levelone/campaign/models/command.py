@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levelone.campaign.models import command_files as files
-from levelone.campaign.models.answers import Judge, answered, came_to_nothing, parameters_of
+from levelone.campaign.models.answers import Answering, answered, came_to_nothing, parameters_of
 from levelone.campaign.models.command_run import PARAMETERS, RESULTS, executable_of, run_command, template_files, template_key
 from levelone.campaign.models.keys import file_digest, plain
 from levelone.campaign.models.mapping import channel_history, command_values, to_si
 from levelone.campaign.models.protocol import Evaluations, FloatArray, ModelFailure, joined
-from levelone.campaign.models.sources import sources_digest
 from levelone.campaign.models.travel import FieldsTravel
 from levelone.errors import InputError
 from levelone.status import Status
@@ -129,7 +128,7 @@ class CommandHistories(_Command):
 
 
 @dataclass(frozen=True, eq=False)
-class CommandResponses(_Command):
+class CommandResponses(Answering, _Command):
     """A command that answers responses itself, in Dakota's format or in JSON.
 
     Parameters
@@ -143,30 +142,6 @@ class CommandResponses(_Command):
 
     boundaries: Boundaries
     task: str
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the responses."""
-        return tuple(each.name for each in self.table.responses)
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Their units."""
-        return tuple(each.unit for each in self.table.responses)
-
-    @property
-    def judged(self) -> tuple[str, ...]:
-        """Criteria that have a Level."""
-        return self._judge.judged
-
-    @cached_property
-    def _judge(self) -> Judge:
-        return Judge(self.table.responses, self.boundaries, self.task)
-
-    @property
-    def key(self) -> Mapping[str, Any]:
-        """As of the command, with the boundaries of the Levels and the code that judges by them."""
-        return {**super().key, "boundaries": plain(self.boundaries), "task": self.task, "sources": sources_digest()}
 
     def evaluate(self, points: FloatArray) -> Evaluations:
         """Responses at ``points`` [n, targets], one run of the command for each."""

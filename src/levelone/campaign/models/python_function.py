@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levelone.campaign.models.answers import Judge, answered, came_to_nothing, parameters_of
+from levelone.campaign.models.answers import Answering, answered, came_to_nothing, parameters_of
 from levelone.campaign.models.importing import code_digest, function_of
 from levelone.campaign.models.keys import plain, versions
 from levelone.campaign.models.mapping import change_of_input, channel_history, real_numbers, to_si
 from levelone.campaign.models.protocol import Evaluations, FloatArray, ModelFailure, joined
-from levelone.campaign.models.sources import sources_digest
 from levelone.campaign.models.travel import FieldsTravel
 from levelone.errors import InputError
 from levelone.status import Status
@@ -108,7 +107,7 @@ class PythonHistories(_Function):
 
 
 @dataclass(frozen=True, eq=False)
-class PythonResponses(_Function):
+class PythonResponses(Answering, _Function):
     """A function of responses: ``({name: float}) -> {response: float}``, or of arrays [n] where it is vectorised.
 
     Parameters
@@ -123,30 +122,6 @@ class PythonResponses(_Function):
 
     boundaries: Boundaries
     task: str
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the responses."""
-        return tuple(each.name for each in self.table.responses)
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Their units."""
-        return tuple(each.unit for each in self.table.responses)
-
-    @property
-    def judged(self) -> tuple[str, ...]:
-        """Criteria that have a Level."""
-        return self._judge.judged
-
-    @cached_property
-    def _judge(self) -> Judge:
-        return Judge(self.table.responses, self.boundaries, self.task)
-
-    @property
-    def key(self) -> Mapping[str, Any]:
-        """As of the function, with the boundaries of the Levels and the code that judges by them."""
-        return {**super().key, "boundaries": plain(self.boundaries), "task": self.task, "sources": sources_digest()}
 
     def evaluate(self, points: FloatArray) -> Evaluations:
         """Responses at ``points`` [n, targets].
