@@ -15,6 +15,7 @@ from levelone.campaign.models.programme import HistoryModel
 from levelone.campaign.models.protocol import ModelFailure
 from levelone.config.model_table import Test
 from levelone.errors import InputError
+from levelone.handling.frequency import FrequencyResponse
 from levelone.handling.levels import Level, load_boundaries
 from levelone.status import Status
 
@@ -331,3 +332,26 @@ def test_a_delay_that_is_stated_keeps_driven_peaks_from_being_taken_for_free_one
     assert value(known, known.evaluate(point), "zeta") == pytest.approx(ZETA, rel=1e-4)
     assert value(known, known.evaluate(point), "omega_n") == pytest.approx(OMEGA_N, rel=1e-4)
     assert abs(value(unknown, unknown.evaluate(point), "zeta") - ZETA) > 0.02
+
+
+@dataclass(frozen=True)
+class Rate(SecondOrder):
+    """The same vehicle read on its pitch rate: j omega times the response of the attitude."""
+
+    def frequency_response(self, point: np.ndarray, command: str, output: str, omega: np.ndarray) -> FrequencyResponse:
+        attitude_response = super().frequency_response(point, command, "theta", omega)
+        return FrequencyResponse(omega, 1j * omega * attitude_response.value)
+
+
+@pytest.mark.theory
+def test_an_integrated_rate_reads_as_the_attitude():
+    """theta = q / (j omega): gain and phase, and so every reading and the Level, are those of the attitude."""
+    point = np.array([NOMINAL])
+    of_attitude = model(LINEAR)
+    of_rate = model(replace(LINEAR, output="q", integrate=True), source=Rate())
+    assert of_rate.judged == of_attitude.judged == ("linear",)
+    expected, found = of_attitude.evaluate(point), of_rate.evaluate(point)
+    assert found.values == pytest.approx(expected.values, rel=1e-12, nan_ok=True)
+    assert found.status.tolist() == expected.status.tolist()
+    assert found.levels.tolist() == expected.levels.tolist()
+    assert np.isfinite(value(of_rate, found, "tau_p"))
